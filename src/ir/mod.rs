@@ -1,0 +1,451 @@
+//! The narrow waist: a [`Design`] is all that elaboration hands to the numerical stages, and a
+//! [`Solution`] all that they hand back. Plain data; units are mm, N, MPa, rad, s throughout.
+
+pub mod expr;
+mod solution;
+
+pub use crate::diagnostic::Origin;
+use expr::{ExprGraph, ExprId};
+use serde::{Deserialize, Serialize};
+pub use solution::Solution;
+
+/// Index into [`Design::bodies`].
+pub type BodyId = usize;
+/// Index into [`Design::joints`].
+pub type JointId = usize;
+/// A point or vector: three scalar expressions, mm.
+pub type ExprPoint = [ExprId; 3];
+
+/// An elaborated mechanism.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Design {
+    /// Name of the mechanism.
+    pub name: String,
+    /// Flat graph of every scalar that may depend on a free variable.
+    pub exprs: ExprGraph,
+    /// Free variables, in order of declaration: the design parameters p.
+    pub free: Vec<FreeVariable>,
+    /// Bodies; the first ground body is body 0.
+    pub bodies: Vec<Body>,
+    /// Joints, conventional and compliant.
+    pub joints: Vec<Joint>,
+    /// Rods of all compliant joints.
+    pub rods: Vec<Rod>,
+    /// Drives.
+    pub drives: Vec<Drive>,
+    /// Steps and duration.
+    pub cycle: Cycle,
+    /// Traced points.
+    pub traces: Vec<Trace>,
+    /// Terms of the objective.
+    pub objectives: Vec<Objective>,
+    /// Acceptance tests.
+    pub requirements: Vec<Requirement>,
+    /// What the part is made of.
+    pub material: Material,
+    /// How it is made.
+    pub process: Process,
+    /// Stacking of planar links.
+    pub layers: Layers,
+    /// Files to emit.
+    pub exports: Vec<Export>,
+    /// The whole mechanism declaration.
+    pub origin: Origin,
+}
+
+/// A design variable: `free START in LOWER .. UPPER`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FreeVariable {
+    /// Path, unique, e.g. `knee.thickness`, `knee.upper.from.at.r`.
+    pub path: String,
+    /// Unit of the three numbers: `mm`, `rad`, `1`, …
+    pub unit: String,
+    /// Start value.
+    pub start: f64,
+    /// Lower bound.
+    pub lower: f64,
+    /// Upper bound.
+    pub upper: f64,
+    /// The `free` expression.
+    pub origin: Origin,
+}
+
+/// A rigid body.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Body {
+    /// Name.
+    pub name: String,
+    /// Fixed to the world.
+    pub ground: bool,
+    /// Skeleton points in the drawing pose: the listed points, then joint points not listed.
+    pub skeleton: Vec<NamedPoint>,
+    /// Layer along the stacking axis.
+    pub layer: i32,
+    /// Declaration.
+    pub origin: Origin,
+}
+
+/// A named point of a skeleton.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NamedPoint {
+    /// Name of the point, or of the joint it comes from.
+    pub name: String,
+    /// Position in the drawing pose.
+    pub position: ExprPoint,
+}
+
+/// Kinds of conventional joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JointKind {
+    /// One rotation about the axis.
+    Hinge,
+    /// Three rotations.
+    Ball,
+    /// Two rotations about orthogonal axes.
+    Universal,
+    /// One translation along the axis.
+    Slider,
+    /// One rotation and one translation along the same axis.
+    Cylindrical,
+    /// No freedom.
+    Fixed,
+}
+
+/// A joint of two or more bodies at one point.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Joint {
+    /// Name.
+    pub name: String,
+    /// Kind.
+    pub kind: JointKind,
+    /// Bodies in the order written; the joint's value is the second relative to the first.
+    pub bodies: Vec<BodyId>,
+    /// Position in the drawing pose, without the layer's offset.
+    pub point: ExprPoint,
+    /// Unit axis in the drawing pose.
+    pub axis: [f64; 3],
+    /// Layer the joint lies in: its physical point is `point + layer * pitch * axis`.
+    pub layer: i32,
+    /// `into BODY toward Q`: overrides e1 of that body's end frame. Points in the drawing pose.
+    pub toward: Vec<(BodyId, ExprPoint)>,
+    /// How it is made.
+    pub realization: Realization,
+    /// Declaration.
+    pub origin: Origin,
+}
+
+impl Joint {
+    /// Whether flexures replace the conventional joint.
+    pub fn is_compliant(&self) -> bool {
+        matches!(self.realization, Realization::Compliant { .. })
+    }
+}
+
+/// How a joint is made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Realization {
+    /// A conventional bearing.
+    Conventional {
+        /// Diameter of a bought pin, if stated.
+        pin_diameter_mm: Option<f64>,
+    },
+    /// Flexures of a template.
+    Compliant {
+        /// Template name.
+        template: String,
+        /// Indices into [`Design::rods`].
+        rods: Vec<usize>,
+    },
+}
+
+/// A flexure modelled as a rod between two bodies.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rod {
+    /// Path, e.g. `knee.upper`.
+    pub path: String,
+    /// The joint it belongs to.
+    pub joint: JointId,
+    /// Start.
+    pub from: RodEnd,
+    /// End.
+    pub to: RodEnd,
+    /// Cross-section.
+    pub section: Section,
+    /// Declaration in the template.
+    pub origin: Origin,
+}
+
+/// One end of a rod, in the end frame of its body at the joint: e3 the joint axis, e1 from the joint
+/// point towards the centroid of the body's other joint points (or the `toward` point) normal to e3,
+/// e2 = e3 × e1, all in the rest pose. Origin: the joint's physical point (with its layer's offset).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RodEnd {
+    /// The body it is clamped in.
+    pub body: BodyId,
+    /// Attachment point, Cartesian components on (e1, e2, e3), mm.
+    pub position: ExprPoint,
+    /// Hermite derivative dP/du, u in 0..1 from → to, components on (e1, e2, e3), mm.
+    pub derivative: ExprPoint,
+}
+
+/// Cross-section; semi-axes, mm. `a` along m₁ (thin, normal to the axis), `b` along m₂ (the axis).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Section {
+    /// Solid ellipse.
+    Ellipse {
+        /// Half the thickness.
+        a: ExprId,
+        /// Half the width.
+        b: ExprId,
+    },
+}
+
+/// A driven joint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Drive {
+    /// Name: the joint's.
+    pub name: String,
+    /// The driven joint.
+    pub joint: JointId,
+    /// Value over the cycle, relative to the drawing pose, rad.
+    pub profile: Profile,
+    /// Value in the rest pose, rad.
+    pub rest_rad: f64,
+    /// Motor, if stated.
+    pub motor: Option<Motor>,
+    /// The motor turns continuously.
+    pub continuous: bool,
+    /// Declaration.
+    pub origin: Origin,
+}
+
+/// A drive's value over the cycle.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Profile {
+    /// Linear from the first to the second.
+    Range {
+        /// At t = 0, rad.
+        from_rad: f64,
+        /// At t = 1, rad.
+        to_rad: f64,
+    },
+}
+
+impl Profile {
+    /// Value at t in 0..1, rad.
+    pub fn value_rad(&self, t: f64) -> f64 {
+        match *self {
+            Profile::Range { from_rad, to_rad } => from_rad + (to_rad - from_rad) * t,
+        }
+    }
+
+    /// Whether the mechanism is in the same pose at t = 0 and t = 1.
+    pub fn is_closed(&self) -> bool {
+        let turns = (self.value_rad(1.0) - self.value_rad(0.0)) / std::f64::consts::TAU;
+        (turns - turns.round()).abs() < 1e-9
+    }
+}
+
+/// Steps and duration: states 0..=steps at t = state / steps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cycle {
+    /// Number of steps N.
+    pub steps: usize,
+    /// Duration of one cycle.
+    pub duration_s: f64,
+    /// Declaration.
+    pub origin: Origin,
+}
+
+/// A traced point.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Trace {
+    /// Name.
+    pub name: String,
+    /// Body that carries it.
+    pub body: BodyId,
+    /// Position in the drawing pose.
+    pub point: ExprPoint,
+    /// Declaration.
+    pub origin: Origin,
+}
+
+/// A term of the objective.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Objective {
+    /// What is minimised.
+    pub kind: ObjectiveKind,
+    /// Weight; the paper's default where the text is silent (1 where a scale is given).
+    pub weight: f64,
+    /// The term.
+    pub origin: Origin,
+}
+
+/// What is minimised.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ObjectiveKind {
+    /// Distance of a trace from its target (paper, eq. 3).
+    Track {
+        /// Index into [`Design::traces`].
+        trace: usize,
+        /// Length that counts as one; none: SI (1 m).
+        scale_mm: Option<f64>,
+    },
+    /// Squared excess of von Mises stress over a bound.
+    StressBelow {
+        /// The bound.
+        bound_mpa: f64,
+        /// Stress that counts as one; none: SI (1 Pa).
+        scale_mpa: Option<f64>,
+    },
+}
+
+/// `require QUERY <= BOUND`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Requirement {
+    /// Aggregate over the cycle.
+    pub aggregate: Aggregate,
+    /// What is measured.
+    pub quantity: Quantity,
+    /// True for `<=` and `<`, false for `>=` and `>`.
+    pub at_most: bool,
+    /// True for `<` and `>`.
+    pub strict: bool,
+    /// Bound in the quantity's unit.
+    pub bound: f64,
+    /// The line as written.
+    pub text: String,
+    /// Its place.
+    pub origin: Origin,
+}
+
+/// How a quantity over the cycle becomes one number.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Aggregate {
+    /// Largest.
+    Max,
+    /// Smallest.
+    Min,
+    /// Mean over the states (a closed cycle's last state counts once).
+    Mean,
+    /// Largest minus smallest.
+    Span,
+    /// At time t in 0..1.
+    At(f64),
+}
+
+/// A measurable quantity of the solved mechanism.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantity {
+    /// Distance of a trace from its target, mm. Index into [`Design::traces`].
+    Error(usize),
+    /// True largest von Mises stress over all rods, MPa.
+    Stress,
+    /// Size of the drive's torque, N·mm. Index into [`Design::drives`].
+    Torque(usize),
+}
+
+/// Material data; what the text does not state is absent.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Material {
+    /// Name.
+    pub name: String,
+    /// Young's modulus, MPa.
+    pub e_mpa: f64,
+    /// Poisson's ratio.
+    pub nu: f64,
+    /// Density, g/mm³.
+    pub density_g_mm3: Option<f64>,
+    /// Strength, MPa.
+    pub strength_mpa: Option<f64>,
+    /// Yield stress, MPa.
+    pub yield_mpa: Option<f64>,
+    /// Design strain for a single bend.
+    pub strain_once: Option<f64>,
+    /// Design strain for repeated bending.
+    pub strain_repeated: Option<f64>,
+}
+
+/// Printing process.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Process {
+    /// Name.
+    pub name: String,
+    /// Least wall or flexure thickness, mm.
+    pub least_wall_mm: f64,
+    /// Least clearance between moving parts, mm.
+    pub clearance_mm: f64,
+}
+
+/// Stacking of planar links along their common axis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Layers {
+    /// Height of a link, mm.
+    pub height_mm: f64,
+    /// Distance of neighbouring layers: height + clearance, mm.
+    pub pitch_mm: f64,
+    /// Common unit axis of the planar links.
+    pub axis: [f64; 3],
+}
+
+/// Motor data.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Motor {
+    /// Name.
+    pub name: String,
+    /// Interface.
+    pub interface: MotorInterface,
+    /// Stall (holding) torque, N·mm.
+    pub stall_n_mm: f64,
+    /// Shaft diameter, mm.
+    pub shaft_diameter_mm: Option<f64>,
+}
+
+/// How a motor is commanded.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MotorInterface {
+    /// Step and direction pulses.
+    Stepper {
+        /// Full steps a turn.
+        steps_per_turn: u32,
+        /// Microsteps a full step, as set on the driver.
+        microsteps: u32,
+    },
+    /// Pulse width.
+    Pwm {
+        /// Range of travel, rad.
+        range_rad: f64,
+    },
+    /// Dynamixel bus.
+    Dynamixel {
+        /// Range of travel, rad.
+        range_rad: f64,
+    },
+}
+
+/// A file to emit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Export {
+    /// What.
+    pub kind: ExportKind,
+    /// Its place.
+    pub origin: Origin,
+}
+
+/// Kinds of export.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ExportKind {
+    /// One binary STL per printed part.
+    Stl,
+    /// Arduino sketch for one drive. Index into [`Design::drives`].
+    Arduino(usize),
+}

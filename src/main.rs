@@ -1,0 +1,2 @@
+//! The `flexura` command.
+fn main() {}

@@ -1,0 +1,382 @@
+//! Typed view of a parsed `.mech` file: what the statements say, each with its place.
+//! Nothing is resolved here: names are text, numbers carry the unit they were written with.
+
+use crate::diagnostic::Origin;
+
+/// A value with the place it was written at.
+#[derive(Clone, Debug, PartialEq)]
+pub struct At<T> {
+    /// The value.
+    pub node: T,
+    /// Its place.
+    pub at: Origin,
+}
+
+/// An identifier at its place.
+pub type Ident = At<String>;
+
+/// A whole file.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct File {
+    /// `edition 1`.
+    pub edition: Option<At<u32>>,
+    /// Imports.
+    pub uses: Vec<Use>,
+    /// Top-level declarations.
+    pub items: Vec<Item>,
+}
+
+/// `use std.materials.rigur` or `use "finger.mech"`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Use {
+    /// What is imported.
+    pub target: UseTarget,
+    /// Whole declaration.
+    pub at: Origin,
+}
+
+/// The target of an import.
+#[derive(Clone, Debug, PartialEq)]
+pub enum UseTarget {
+    /// A dotted path into the standard library.
+    Std(Vec<Ident>),
+    /// A neighbouring file, relative to the importing one.
+    File(At<String>),
+}
+
+/// A top-level declaration.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Item {
+    /// `mechanism NAME { … }`
+    Mechanism(Mechanism),
+    /// `flexure NAME replaces KIND { … }`
+    Flexure(Flexure),
+    /// `material NAME { field = value … }`, and likewise `process` and `motor`.
+    Record(Record),
+}
+
+/// `material`, `process` or `motor` with its fields.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Record {
+    /// `material`, `process` or `motor`.
+    pub kind: Ident,
+    /// Its name.
+    pub name: Ident,
+    /// Fields in order.
+    pub fields: Vec<(Ident, Expr)>,
+    /// Doc comment (`///` lines joined by newlines), empty if none.
+    pub doc: String,
+    /// Whole declaration.
+    pub at: Origin,
+}
+
+/// `mechanism NAME { … }`
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mechanism {
+    /// Its name.
+    pub name: Ident,
+    /// Statements in order.
+    pub statements: Vec<Statement>,
+    /// Doc comment.
+    pub doc: String,
+    /// Whole declaration.
+    pub at: Origin,
+}
+
+/// `flexure NAME replaces KIND { … }`
+#[derive(Clone, Debug, PartialEq)]
+pub struct Flexure {
+    /// Its name.
+    pub name: Ident,
+    /// The joint kind it replaces, e.g. `hinge`.
+    pub replaces: Ident,
+    /// `param`, `let` and `rod` statements in order.
+    pub statements: Vec<Statement>,
+    /// Doc comment.
+    pub doc: String,
+    /// Whole declaration.
+    pub at: Origin,
+}
+
+/// A statement with its place (the whole statement) and doc comment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Statement {
+    /// What it says.
+    pub kind: StatementKind,
+    /// The whole statement, without the doc comment.
+    pub at: Origin,
+    /// `///` lines before it.
+    pub doc: String,
+}
+
+/// Everything a statement can be.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StatementKind {
+    /// `param NAME[: TYPE] = EXPR`
+    Param {
+        /// Name.
+        name: Ident,
+        /// Declared dimension, e.g. `length`.
+        ty: Option<Ident>,
+        /// Default value.
+        value: Expr,
+    },
+    /// `let NAME = EXPR`
+    Let {
+        /// Name.
+        name: Ident,
+        /// Value.
+        value: Expr,
+    },
+    /// `point NAME = EXPR`
+    Point {
+        /// Name.
+        name: Ident,
+        /// Value.
+        value: Expr,
+    },
+    /// `ground NAME { P, Q } [layer N]` or `link …`
+    Body {
+        /// True for `ground`.
+        ground: bool,
+        /// Name.
+        name: Ident,
+        /// Skeleton points.
+        points: Vec<Ident>,
+        /// `layer N`.
+        layer: Option<Expr>,
+    },
+    /// `KIND NAME: A to B[, C] at P [axis D] [layer N] [pin D] [into BODY toward Q]… [as TEMPLATE [{ … }]]`
+    Joint(Box<Joint>),
+    /// `material NAME`
+    Material(Ident),
+    /// `print on NAME`
+    PrintOn(Ident),
+    /// `cycle N steps [over T]`
+    Cycle {
+        /// Number of steps.
+        steps: Expr,
+        /// Duration.
+        over: Option<Expr>,
+    },
+    /// `drive J from A to B [with MOTOR [continuous]]` and other forms.
+    Drive {
+        /// The driven joint.
+        joint: Ident,
+        /// The profile.
+        profile: Profile,
+        /// `with MOTOR`.
+        motor: Option<Ident>,
+        /// `continuous` was written.
+        continuous: bool,
+    },
+    /// `rest DRIVE at EXPR`
+    Rest {
+        /// The driven joint.
+        joint: Ident,
+        /// Its value in the rest pose (may be `free`).
+        value: Expr,
+    },
+    /// `trace NAME = P on BODY`
+    Trace {
+        /// Name.
+        name: Ident,
+        /// Point.
+        point: Expr,
+        /// Body.
+        body: Ident,
+    },
+    /// `minimize { TERM [weight W] … }`
+    Minimize(Vec<Term>),
+    /// `require EXPR <= EXPR`
+    Require {
+        /// Left side.
+        left: Expr,
+        /// Comparison.
+        op: At<Compare>,
+        /// Right side.
+        right: Expr,
+    },
+    /// `export A, B(c)`
+    Export(Vec<Expr>),
+    /// `rod NAME { from a at … along … to b at … along … section … }` (templates only)
+    Rod(Box<Rod>),
+    /// A statement of the target language that this version does not have yet: its keyword.
+    Later {
+        /// Keyword.
+        keyword: Ident,
+    },
+    /// What could not be understood; a diagnostic has been given already.
+    Broken,
+}
+
+/// A joint statement.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// `hinge`, `ball`, …
+    pub kind: Ident,
+    /// Name.
+    pub name: Ident,
+    /// First body, then the bodies after `to`.
+    pub bodies: Vec<Ident>,
+    /// Where.
+    pub point: Expr,
+    /// `axis D`: `x`, `y`, `z` as [`ExprKind::Name`], or a tuple.
+    pub axis: Option<Expr>,
+    /// `layer N`.
+    pub layer: Option<Expr>,
+    /// `pin D`.
+    pub pin: Option<Expr>,
+    /// `into BODY toward Q`, each.
+    pub into: Vec<(Ident, Expr)>,
+    /// `as TEMPLATE { overrides }`.
+    pub template: Option<TemplateUse>,
+}
+
+/// `as TEMPLATE { name = value … }`
+#[derive(Clone, Debug, PartialEq)]
+pub struct TemplateUse {
+    /// Template name.
+    pub name: Ident,
+    /// Overrides in order.
+    pub overrides: Vec<(Ident, Expr)>,
+}
+
+/// The profile of a drive.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Profile {
+    /// `from A to B`
+    Range(Expr, Expr),
+    /// A form this version does not have yet (`by …`): its place.
+    Later(Origin),
+}
+
+/// A term of the objective.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Term {
+    /// The call, e.g. `track(tip, scale = 0.1 mm)`.
+    pub call: Expr,
+    /// `weight W`.
+    pub weight: Option<Expr>,
+    /// Whole term.
+    pub at: Origin,
+}
+
+/// Comparison operators of `require`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Compare {
+    /// `<=`
+    LessEqual,
+    /// `<`
+    Less,
+    /// `>=`
+    GreaterEqual,
+    /// `>`
+    Greater,
+}
+
+/// A rod of a template.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rod {
+    /// Name.
+    pub name: Ident,
+    /// `from BODY at … along …`
+    pub from: RodEnd,
+    /// `to BODY at … along …`
+    pub to: RodEnd,
+    /// `section …`
+    pub section: Expr,
+}
+
+/// One end of a rod.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RodEnd {
+    /// `a`, `b`, `c`: the joint's bodies in order.
+    pub body: Ident,
+    /// Position, e.g. a call of `cyl`.
+    pub position: Expr,
+    /// Hermite derivative, e.g. a call of `cyl`.
+    pub along: Expr,
+}
+
+/// An expression at its place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Expr {
+    /// What it is.
+    pub kind: ExprKind,
+    /// Its place.
+    pub at: Origin,
+}
+
+/// Everything an expression can be.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ExprKind {
+    /// `2.5 mm`, `60`, `8 N*mm`, `1.2 g/cm^3`, `20 %`.
+    Number {
+        /// The number as written.
+        value: f64,
+        /// Factors of the unit in order: (`mm`, 1), (`cm`, -3) …; empty for a bare number.
+        unit: Vec<UnitFactor>,
+    },
+    /// `r`, `rigur.strength`.
+    Name(Vec<Ident>),
+    /// `"text"`.
+    Text(String),
+    /// `(a, b)` or `(a, b, c)`. Plain parentheses leave no node.
+    Tuple(Vec<Expr>),
+    /// `-a`.
+    Negate(Box<Expr>),
+    /// `a + b` …
+    Binary(BinaryOp, Box<Expr>, Box<Expr>),
+    /// `f(a, name = b)`.
+    Call {
+        /// Function.
+        function: Ident,
+        /// Arguments.
+        arguments: Vec<Argument>,
+    },
+    /// `free START in LOWER .. UPPER`.
+    Free {
+        /// Start.
+        start: Box<Expr>,
+        /// Lower bound.
+        lower: Box<Expr>,
+        /// Upper bound.
+        upper: Box<Expr>,
+    },
+    /// What could not be understood; a diagnostic has been given already.
+    Broken,
+}
+
+/// A unit symbol with its exponent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UnitFactor {
+    /// Symbol as written (`mm`, `N`, `%`); the elaborator knows which exist.
+    pub symbol: Ident,
+    /// Exponent, negative after `/`.
+    pub exponent: i32,
+}
+
+/// An argument of a call.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Argument {
+    /// `name =`, if written.
+    pub name: Option<Ident>,
+    /// Value.
+    pub value: Expr,
+}
+
+/// Binary operators. `^` takes an integer literal exponent on the right.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BinaryOp {
+    /// `+`
+    Add,
+    /// `-`
+    Subtract,
+    /// `*`
+    Multiply,
+    /// `/`
+    Divide,
+    /// `^`
+    Power,
+}

@@ -1,0 +1,3 @@
+//! Text to tree. The only client of pest.
+
+pub mod ast;
