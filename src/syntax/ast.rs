@@ -152,6 +152,11 @@ pub enum StatementKind {
     Material(Ident),
     /// `print on NAME`
     PrintOn(Ident),
+    /// `links height EXPR`: height of every planar link along the stacking axis.
+    Links {
+        /// Height.
+        height: Expr,
+    },
     /// `cycle N steps [over T]`
     Cycle {
         /// Number of steps.
