@@ -1,1 +1,18 @@
-//! (being written)
+//! Many rods and links: the compliant mechanism in equilibrium over its cycle
+//! (Megaro et al. 2017, eq. 1), its stability, drive torques, and the derivatives of all of it by
+//! the design parameters (eqs. 17–19).
+//!
+//! The rods are condensed one by one onto the links they join, so what is solved here is a small
+//! symmetric saddle-point system of link increments and multipliers.
+
+mod layout;
+mod model;
+mod newton;
+mod sensitivity;
+mod sweep;
+
+pub use layout::{Layout, RodEndFrame};
+pub use model::{Model, ModelError, ModelRod, State};
+pub use newton::{Equilibrium, SolveError, Solver};
+pub use sensitivity::{Sensitivity, SensitivityWorkspace};
+pub use sweep::{Cycle, SweepError, sweep};

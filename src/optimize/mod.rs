@@ -1,1 +1,16 @@
-//! (being written)
+//! From a start to an optimised design: objectives, their exact derivatives through equilibrium, and
+//! the solvers (Megaro et al. 2017, section 4). The only client of argmin.
+
+mod box_qp;
+mod guards;
+mod lbfgs;
+mod levenberg;
+mod normal;
+pub mod objectives;
+mod problem;
+mod run;
+
+pub use box_qp::minimize_in_box;
+pub use normal::Normal;
+pub use problem::{Problem, Trial};
+pub use run::{Ending, Iteration, Method, Optimized, optimize};

@@ -1,0 +1,123 @@
+//! The compliant model at given design parameters: the layout plus one rod per flexure, with the
+//! derivatives of each rod's parameters by the design parameters.
+
+use super::layout::Layout;
+use crate::ir::{Design, Section};
+use crate::math::Pose;
+use crate::rod::{PARAMETERS, Rod, RodError, RodMaterial, RodParameters, RodState};
+use nalgebra::{DMatrix, Vector3};
+
+/// A rod between two bodies.
+#[derive(Clone, Debug)]
+pub struct ModelRod {
+    /// The rod.
+    pub rod: Rod,
+    /// Bodies of its two ends.
+    pub bodies: [usize; 2],
+    /// Its parameters by the design parameters, 17 × n.
+    pub dq_dp: DMatrix<f64>,
+}
+
+/// The model at given parameters.
+#[derive(Clone, Debug)]
+pub struct Model<'l> {
+    /// What does not depend on the parameters.
+    pub layout: &'l Layout,
+    /// One per flexure.
+    pub rods: Vec<ModelRod>,
+}
+
+/// A flexure whose parameters make no rod.
+#[derive(Clone, Debug)]
+pub struct ModelError {
+    /// Index into `Design::rods`.
+    pub rod: usize,
+    /// Why.
+    pub error: RodError,
+}
+
+/// Everything that moves: poses, rods, multipliers.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// Pose of each body relative to rest.
+    pub poses: Vec<Pose>,
+    /// Centreline and frames of each rod.
+    pub rods: Vec<RodState>,
+    /// Multipliers: constraint rows in order, then drives (N, N·mm, N·mm per rad).
+    pub lambda: Vec<f64>,
+    /// Drive angle relative to rest, unwrapped, rad.
+    pub drives_rad: Vec<f64>,
+}
+
+impl<'l> Model<'l> {
+    /// Builds the rods at free variables `p`, each with `edges` edges; with `derivatives` also what
+    /// [`Sensitivity`](super::Sensitivity) needs of them.
+    ///
+    /// # Errors
+    /// The first flexure whose rest shape is degenerate.
+    pub fn new(
+        design: &Design,
+        layout: &'l Layout,
+        p: &[f64],
+        edges: usize,
+        derivatives: bool,
+    ) -> Result<Self, ModelError> {
+        let values = design.exprs.evaluate(p);
+        let material = RodMaterial { e_mpa: design.material.e_mpa, nu: design.material.nu };
+        let mut rods = Vec::with_capacity(design.rods.len());
+        for (index, (rod, ends)) in design.rods.iter().zip(&layout.rod_ends).enumerate() {
+            let mut q = [0.0; PARAMETERS];
+            let mut dq_dp = DMatrix::zeros(PARAMETERS, p.len());
+            for (k, (end, frame)) in [&rod.from, &rod.to].into_iter().zip(ends).enumerate() {
+                let at_end = [(end.position, frame.origin), (end.derivative, Vector3::zeros())];
+                for (j, (local, offset)) in at_end.into_iter().enumerate() {
+                    let row = 6 * k + 3 * j;
+                    let world = offset + frame.axes * values.point(local);
+                    for c in 0..3 {
+                        q[row + c] = world[c];
+                        for (e, id) in local.iter().enumerate() {
+                            for (column, g) in values.gradient(*id).iter().enumerate() {
+                                dq_dp[(row + c, column)] += frame.axes[(c, e)] * g;
+                            }
+                        }
+                    }
+                }
+            }
+            for c in 0..3 {
+                q[12 + c] = ends[0].axes[(c, 2)];
+            }
+            let Section::Ellipse { a, b } = &rod.section;
+            for (row, id) in [(15, *a), (16, *b)] {
+                q[row] = values.value(id);
+                for (column, g) in values.gradient(id).iter().enumerate() {
+                    dq_dp[(row, column)] = *g;
+                }
+            }
+            let build = if derivatives { Rod::with_derivatives } else { Rod::new };
+            let built = build(&RodParameters::from_array(&q), material, edges)
+                .map_err(|error| ModelError { rod: index, error })?;
+            rods.push(ModelRod { rod: built, bodies: [rod.from.body, rod.to.body], dq_dp });
+        }
+        Ok(Self { layout, rods })
+    }
+
+    /// The unstressed rest state.
+    pub fn rest_state(&self) -> State {
+        State {
+            poses: self.layout.bodies.iter().map(|b| Pose::rest(b.center)).collect(),
+            rods: self.rods.iter().map(|r| r.rod.rest_state()).collect(),
+            lambda: vec![0.0; self.rows()],
+            drives_rad: vec![0.0; self.layout.drives.len()],
+        }
+    }
+
+    /// Number of constraint and drive rows.
+    pub fn rows(&self) -> usize {
+        self.layout.constraints.iter().map(|c| c.rows()).sum::<usize>() + self.layout.drives.len()
+    }
+
+    /// Elastic energy of all rods, N·mm.
+    pub fn energy_n_mm(&self, state: &State) -> f64 {
+        self.rods.iter().zip(&state.rods).map(|(r, s)| r.rod.energy(s)).sum()
+    }
+}

@@ -1,0 +1,401 @@
+//! Newton's method on the total potential with constraints: rod by rod condensation, one small
+//! saddle-point system for links and multipliers, full steps first.
+
+use super::model::{Model, State};
+use crate::kinematics::{Constraint, Jacobian};
+use crate::math::Ldlt;
+use crate::rod::RodSystem;
+use nalgebra::{DMatrix, DVector, SVector};
+
+/// Relative residual of an accepted state, against the largest internal force
+/// (`RESIDUAL · F*`; reached in the last quadratic step, typically 1e-11 to 1e-13).
+const RESIDUAL: f64 = 1e-9;
+/// Constraints of an accepted state, mm (levers times radians for directions and angles).
+const CONSTRAINT_MM: f64 = 1e-9;
+/// Lower-right regularisation δ = this · ‖J‖²/‖H‖ for redundant rows (1e-12 to 1e-8 give the same states).
+const REDUNDANCY: f64 = 1e-10;
+/// Newton iterations before a step counts as failed. Accepted steps take 2 to 8.
+const ITERATIONS: usize = 40;
+/// Largest rotation of a link in one iteration, rad: beyond it the chart's linearisation is poor.
+const ROTATION_STEP_RAD: f64 = 0.4;
+/// Largest displacement of a link in one iteration, in lever lengths.
+const TRANSLATION_STEP: f64 = 0.5;
+
+/// Why no equilibrium was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SolveError {
+    /// The iteration did not settle.
+    NotConverged,
+    /// Numbers left the range of the arithmetic.
+    NotFinite,
+}
+
+/// An accepted equilibrium.
+#[derive(Clone, Debug)]
+pub struct Equilibrium {
+    /// The state.
+    pub state: State,
+    /// Whether it is a strict minimum with the drives held (Haynsworth inertia).
+    pub stable: bool,
+    /// Elastic energy, N·mm.
+    pub energy_n_mm: f64,
+    /// Newton iterations taken.
+    pub iterations: usize,
+}
+
+impl Equilibrium {
+    /// Torque the motor exerts on the drive's second body, N·mm: τ = dΠ/dα = −λ.
+    pub fn torque_n_mm(&self, model: &Model, drive: usize) -> f64 {
+        -self.state.lambda[model.rows() - model.layout.drives.len() + drive]
+    }
+}
+
+/// Workspace of one thread: rod systems and the factors of the last solved state.
+pub struct Solver {
+    pub(super) systems: Vec<RodSystem>,
+    pub(super) factors: Option<Ldlt>,
+    pub(super) scale: DVector<f64>,
+    pub(super) rods_positive: bool,
+    jacobian: Jacobian,
+}
+
+/// Sizes of what is not yet in balance.
+struct Residual {
+    force_n: f64,
+    constraint_mm: f64,
+    tolerance_n: f64,
+}
+
+impl Residual {
+    fn small(&self) -> bool {
+        self.force_n <= self.tolerance_n && self.constraint_mm <= CONSTRAINT_MM
+    }
+}
+
+impl Solver {
+    /// Workspace for a model with this many edges and rods.
+    pub fn new(model: &Model) -> Self {
+        let n = model.layout.dofs();
+        let m = model.rows();
+        let mut scale = DVector::from_element(n + m, 1.0);
+        let lever = model.layout.length_mm;
+        for i in 0..n {
+            if i % 6 >= 3 {
+                scale[i] = 1.0 / lever;
+            }
+        }
+        let mut row = n;
+        for c in &model.layout.constraints {
+            for _ in 0..c.rows() {
+                scale[row] = if c.is_length() { 1.0 } else { lever };
+                row += 1;
+            }
+        }
+        for _ in &model.layout.drives {
+            scale[row] = lever;
+            row += 1;
+        }
+        Self {
+            systems: model.rods.iter().map(|r| RodSystem::new(&r.rod)).collect(),
+            factors: None,
+            scale,
+            rods_positive: false,
+            jacobian: Jacobian::default(),
+        }
+    }
+
+    /// Solves for equilibrium at the drive values `target` (relative to rest, rad), from `state`.
+    /// On success the factors of the solved state are kept for tangents and sensitivities.
+    ///
+    /// # Errors
+    /// [`SolveError`]; `state` is then of no use.
+    pub fn solve(&mut self, model: &Model, state: State, target: &[f64]) -> Result<Equilibrium, SolveError> {
+        let mut state = state;
+        for iteration in 0..ITERATIONS {
+            let residual = self.assemble(model, &mut state, target);
+            if !(residual.force_n.is_finite() && residual.constraint_mm.is_finite()) {
+                return Err(SolveError::NotFinite);
+            }
+            if residual.small() {
+                let stable = self.factor(model, &state, true);
+                let energy_n_mm = self.systems.iter().map(|s| s.energy()).sum();
+                return Ok(Equilibrium { state, stable, energy_n_mm, iterations: iteration });
+            }
+            self.factor(model, &state, false);
+            let step = self.newton_step(model, &state, target);
+            if step.iter().any(|v| !v.is_finite()) {
+                return Err(SolveError::NotFinite);
+            }
+            let fraction = step_fraction(model, &step);
+            self.advance(model, &mut state, &step, fraction)?;
+        }
+        Err(SolveError::NotConverged)
+    }
+
+    /// Assembles all rods and measures the residual.
+    fn assemble(&mut self, model: &Model, state: &mut State, target: &[f64]) -> Residual {
+        let layout = model.layout;
+        let mut gradient = DVector::zeros(layout.dofs());
+        let (mut internal, mut largest, mut least_stiffness, mut floor) = (0.0f64, 0.0f64, f64::MAX, 0.0f64);
+        for ((rod, system), rod_state) in model.rods.iter().zip(&mut self.systems).zip(&state.rods) {
+            let [a, b] = rod.bodies;
+            system.assemble(&rod.rod, rod_state, &state.poses[a], &state.poses[b]);
+            internal = internal.max(system.internal_residual_norm());
+            largest = largest.max(system.largest_internal_force());
+            least_stiffness = least_stiffness.min(rod.rod.least_bending_stiffness() / rod.rod.length_mm().powi(2));
+            floor = floor.max(system.rounding_floor(&rod.rod, rod_state));
+            scatter(model, rod.bodies, system.link_gradient(), &mut gradient);
+        }
+        let mut constraint_mm = 0.0f64;
+        self.for_each_row(model, state, target, |_, bodies, lambda, residual, weight, row| {
+            constraint_mm = constraint_mm.max((residual * weight).abs());
+            scatter(model, bodies, &(row * lambda), &mut gradient);
+        });
+        let mut force_n = internal;
+        for i in 0..gradient.len() {
+            force_n = force_n.max((gradient[i] * self.scale[i]).abs());
+        }
+        let tolerance_n = RESIDUAL * largest.max(1e-3 * least_stiffness) + floor;
+        Residual { force_n, constraint_mm, tolerance_n }
+    }
+
+    /// Calls `f(row, bodies, λ, residual, scale, gradient)` for every constraint and drive row.
+    fn for_each_row(
+        &mut self,
+        model: &Model,
+        state: &State,
+        target: &[f64],
+        mut f: impl FnMut(usize, [usize; 2], f64, f64, f64, &SVector<f64, 12>),
+    ) {
+        let n = model.layout.dofs();
+        let mut row = 0;
+        let mut residual = [0.0; Constraint::MAX_ROWS];
+        for c in &model.layout.constraints {
+            c.residual(&state.poses, &mut residual);
+            c.jacobian(&state.poses, &mut self.jacobian);
+            for r in 0..c.rows() {
+                let mut gradient = SVector::<f64, 12>::zeros();
+                for k in 0..6 {
+                    gradient[k] = self.jacobian.a[(r, k)];
+                    gradient[6 + k] = self.jacobian.b[(r, k)];
+                }
+                f(row, c.bodies(), state.lambda[row], residual[r], self.scale[n + row], &gradient);
+                row += 1;
+            }
+        }
+        for (i, drive) in model.layout.drives.iter().enumerate() {
+            let value = drive.angle.value(&state.poses, state.drives_rad[i]);
+            let gradient = drive.angle.gradient(&state.poses);
+            f(
+                row,
+                [drive.angle.a, drive.angle.b],
+                state.lambda[row],
+                value - target[i],
+                self.scale[n + row],
+                &gradient,
+            );
+            row += 1;
+        }
+    }
+
+    /// Condenses the rods and factors the scaled saddle-point matrix. With `exact` nothing is
+    /// shifted, and the answer says whether the state is a strict minimum; otherwise rods and links
+    /// are shifted until the step is one of descent.
+    fn factor(&mut self, model: &Model, state: &State, exact: bool) -> bool {
+        let n = model.layout.dofs();
+        let m = model.rows();
+        let mut k = DMatrix::<f64>::zeros(n + m, n + m);
+        self.rods_positive = true;
+        for (rod, system) in model.rods.iter().zip(&mut self.systems) {
+            let report = if exact { system.factor_unshifted() } else { system.factor() };
+            self.rods_positive &= report.negative_pivots == 0;
+            let (_, hessian) = system.condense();
+            scatter_matrix(model, rod.bodies, hessian, &mut k);
+        }
+        let mut row = 0;
+        for c in &model.layout.constraints {
+            let lambda = &state.lambda[row..row + c.rows()];
+            scatter_matrix(model, c.bodies(), &c.hessian(&state.poses, lambda), &mut k);
+            row += c.rows();
+        }
+        for (i, drive) in model.layout.drives.iter().enumerate() {
+            let h = drive.angle.hessian(&state.poses) * state.lambda[row + i];
+            scatter_matrix(model, [drive.angle.a, drive.angle.b], &h, &mut k);
+        }
+        let target: Vec<f64> = state.drives_rad.clone();
+        self.for_each_row(model, state, &target, |row, bodies, _, _, _, gradient| {
+            for (half, body) in bodies.into_iter().enumerate() {
+                if let Some(first) = model.layout.bodies[body].first_dof {
+                    for c in 0..6 {
+                        k[(n + row, first + c)] += gradient[6 * half + c];
+                    }
+                }
+            }
+        });
+        for i in 0..n + m {
+            for j in 0..=i {
+                k[(i, j)] *= self.scale[i] * self.scale[j];
+            }
+        }
+        let h_norm = (0..n).map(|i| k[(i, i)].abs()).fold(f64::MIN_POSITIVE, f64::max);
+        let j_norm = (n..n + m).flat_map(|i| (0..n).map(move |j| (i, j))).map(|ij| k[ij].abs()).fold(0.0, f64::max);
+        for i in n..n + m {
+            k[(i, i)] = -REDUNDANCY * j_norm * j_norm / h_norm;
+        }
+        let mut factors = Ldlt::new(k.clone());
+        let minimum = |f: &Ldlt| f.inertia().negative == m && f.inertia().zero == 0;
+        let stable = minimum(&factors) && self.rods_positive;
+        if !exact {
+            let mut shift = 1e-4 * h_norm;
+            while !minimum(&factors) && shift < 1e6 * h_norm {
+                let mut shifted = k.clone();
+                for i in 0..n {
+                    shifted[(i, i)] += shift;
+                }
+                factors = Ldlt::new(shifted);
+                shift *= 10.0;
+            }
+        }
+        self.factors = Some(factors);
+        stable
+    }
+
+    /// Right-hand side of the scaled system for a full Newton step, and its solution: link
+    /// increments, then the change of the multipliers.
+    fn newton_step(&mut self, model: &Model, state: &State, target: &[f64]) -> DVector<f64> {
+        let n = model.layout.dofs();
+        let mut rhs = DVector::zeros(n + model.rows());
+        let mut gradient = DVector::zeros(n);
+        for (rod, system) in model.rods.iter().zip(&self.systems) {
+            scatter(model, rod.bodies, &system.condensed_gradient, &mut gradient);
+        }
+        self.for_each_row(model, state, target, |row, bodies, lambda, residual, _, row_gradient| {
+            scatter(model, bodies, &(row_gradient * lambda), &mut gradient);
+            rhs[n + row] = -residual;
+        });
+        for i in 0..n {
+            rhs[i] = -gradient[i];
+        }
+        self.solve_scaled(&mut rhs);
+        rhs
+    }
+
+    /// Solves the factored system for one unscaled right-hand side in place.
+    pub(super) fn solve_scaled(&self, rhs: &mut DVector<f64>) {
+        rhs.component_mul_assign(&self.scale);
+        if let Some(f) = &self.factors {
+            f.solve_column(rhs.as_mut_slice());
+        }
+        rhs.component_mul_assign(&self.scale);
+    }
+
+    /// Derivative of links and multipliers by drive value `drive` at the last solved state.
+    pub(super) fn drive_tangent(&self, model: &Model, drive: usize) -> DVector<f64> {
+        let n = model.layout.dofs();
+        let m = model.rows();
+        let mut rhs = DVector::zeros(n + m);
+        rhs[n + m - model.layout.drives.len() + drive] = 1.0;
+        self.solve_scaled(&mut rhs);
+        rhs
+    }
+
+    /// Moves the state along `step` (links, multipliers) with the rods following.
+    pub(super) fn advance(
+        &mut self,
+        model: &Model,
+        state: &mut State,
+        step: &DVector<f64>,
+        fraction: f64,
+    ) -> Result<(), SolveError> {
+        let n = model.layout.dofs();
+        let mut fraction = fraction;
+        // A frame that would turn by more than a right angle leaves the branch of its twist: shorten.
+        for _ in 0..8 {
+            let mut next = state.clone();
+            for (pose, body) in next.poses.iter_mut().zip(&model.layout.bodies) {
+                if let Some(first) = body.first_dof {
+                    let d = step.fixed_rows::<6>(first) * fraction;
+                    *pose = pose.retract(&d.fixed_rows::<3>(0).into(), &d.fixed_rows::<3>(3).into());
+                }
+            }
+            let mut turned = false;
+            for ((rod, system), rod_state) in model.rods.iter().zip(&mut self.systems).zip(&mut next.rods) {
+                let d_link = gather(model, rod.bodies, step);
+                let mut internal = system.back_substitute(&d_link).to_vec();
+                internal.iter_mut().for_each(|v| *v *= fraction);
+                let [a, b] = rod.bodies;
+                turned |=
+                    rod.rod.retract(rod_state, &internal, &next.poses[a], &next.poses[b]).is_err();
+            }
+            if !turned {
+                for (l, d) in next.lambda.iter_mut().zip(step.rows(n, model.rows()).iter()) {
+                    *l += fraction * d;
+                }
+                for (value, drive) in next.drives_rad.iter_mut().zip(&model.layout.drives) {
+                    *value = drive.angle.value(&next.poses, *value);
+                }
+                *state = next;
+                return Ok(());
+            }
+            fraction *= 0.5;
+        }
+        Err(SolveError::NotConverged)
+    }
+}
+
+/// Adds a 12-vector of two bodies into the link vector.
+pub(super) fn scatter(model: &Model, bodies: [usize; 2], v: &SVector<f64, 12>, out: &mut DVector<f64>) {
+    for (half, body) in bodies.into_iter().enumerate() {
+        if let Some(first) = model.layout.bodies[body].first_dof {
+            for c in 0..6 {
+                out[first + c] += v[6 * half + c];
+            }
+        }
+    }
+}
+
+/// The increments of two bodies out of the link vector; zero for ground.
+pub(super) fn gather(model: &Model, bodies: [usize; 2], v: &DVector<f64>) -> SVector<f64, 12> {
+    let mut out = SVector::zeros();
+    for (half, body) in bodies.into_iter().enumerate() {
+        if let Some(first) = model.layout.bodies[body].first_dof {
+            for c in 0..6 {
+                out[6 * half + c] = v[first + c];
+            }
+        }
+    }
+    out
+}
+
+fn scatter_matrix(
+    model: &Model,
+    bodies: [usize; 2],
+    h: &nalgebra::SMatrix<f64, 12, 12>,
+    out: &mut DMatrix<f64>,
+) {
+    let first = bodies.map(|b| model.layout.bodies[b].first_dof);
+    for (i, row) in first.iter().enumerate() {
+        for (j, column) in first.iter().enumerate() {
+            if let (Some(row), Some(column)) = (row, column) {
+                for r in 0..6 {
+                    for c in 0..6 {
+                        out[(row + r, column + c)] += h[(6 * i + r, 6 * j + c)];
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn step_fraction(model: &Model, step: &DVector<f64>) -> f64 {
+    let mut fraction = 1.0f64;
+    for body in &model.layout.bodies {
+        if let Some(first) = body.first_dof {
+            let du = step.fixed_rows::<3>(first).norm();
+            let dphi = step.fixed_rows::<3>(first + 3).norm();
+            fraction = fraction.min(TRANSLATION_STEP * model.layout.length_mm / du.max(f64::MIN_POSITIVE));
+            fraction = fraction.min(ROTATION_STEP_RAD / dphi.max(f64::MIN_POSITIVE));
+        }
+    }
+    fraction
+}

@@ -1,0 +1,149 @@
+//! Continuation over the cycle: from the unstressed rest pose to the nearest state, then forward to
+//! the last and backward to the first, each step predicted along the tangent by the drive values.
+
+use super::model::{Model, State};
+use super::newton::{Equilibrium, SolveError, Solver};
+use nalgebra::DVector;
+
+/// Smallest part of a step that is still tried when whole ones fail.
+const LEAST_PART: f64 = 1.0 / 128.0;
+
+/// Equilibria of all states 0..=N.
+#[derive(Clone, Debug)]
+pub struct Cycle {
+    /// One per state.
+    pub states: Vec<Equilibrium>,
+}
+
+/// The mechanism could not be followed through its cycle.
+#[derive(Clone, Debug)]
+pub struct SweepError {
+    /// The state that could not be reached.
+    pub state: usize,
+    /// Drive values of the last equilibrium before it, relative to the drawing pose, rad.
+    pub last_drives_rad: Vec<f64>,
+    /// What went wrong there.
+    pub error: SolveError,
+}
+
+/// Follows the mechanism through its cycle. The forward and the backward part are independent.
+///
+/// # Errors
+/// [`SweepError`] at the first state that no step size reaches.
+pub fn sweep(model: &Model) -> Result<Cycle, SweepError> {
+    let count = model.layout.states();
+    let target = |s: usize| -> Vec<f64> {
+        model.layout.drives.iter().map(|d| d.values_rad[s] - d.rest_rad).collect()
+    };
+    let distance = |s: usize| target(s).iter().map(|v| v * v).sum::<f64>();
+    let nearest =
+        (0..count).min_by(|a, b| distance(*a).total_cmp(&distance(*b))).unwrap_or(0);
+
+    let mut solver = Solver::new(model);
+    let start = Walker::at_rest(model, &mut solver);
+    let mut first = start?;
+    first.walk(model, &mut solver, nearest, &target(nearest))?;
+    let middle = first.equilibrium.clone();
+    let run = |states: &mut dyn Iterator<Item = usize>| -> Result<Vec<Equilibrium>, SweepError> {
+        let mut solver = Solver::new(model);
+        let mut walker = first.clone();
+        let mut out = Vec::new();
+        for s in states {
+            walker.walk(model, &mut solver, s, &target(s))?;
+            out.push(walker.equilibrium.clone());
+        }
+        Ok(out)
+    };
+    let (forward, backward) =
+        rayon::join(|| run(&mut (nearest + 1..count)), || run(&mut (0..nearest).rev()));
+    let mut states = backward?;
+    states.reverse();
+    states.push(middle);
+    states.extend(forward?);
+    Ok(Cycle { states })
+}
+
+/// A followed equilibrium and the drive values it belongs to.
+#[derive(Clone)]
+struct Walker {
+    equilibrium: Equilibrium,
+    drives_rad: Vec<f64>,
+}
+
+impl Walker {
+    fn at_rest(model: &Model, solver: &mut Solver) -> Result<Self, SweepError> {
+        let drives_rad = vec![0.0; model.layout.drives.len()];
+        let equilibrium = solver
+            .solve(model, model.rest_state(), &drives_rad)
+            .map_err(|error| Self::lost(model, &drives_rad, 0, error))?;
+        Ok(Self { equilibrium, drives_rad })
+    }
+
+    fn lost(model: &Model, drives: &[f64], state: usize, error: SolveError) -> SweepError {
+        let last_drives_rad = drives.iter().zip(&model.layout.drives).map(|(v, d)| v + d.rest_rad).collect();
+        SweepError { state, last_drives_rad, error }
+    }
+
+    /// Goes to `target`, in one step where that works.
+    fn walk(
+        &mut self,
+        model: &Model,
+        solver: &mut Solver,
+        state: usize,
+        target: &[f64],
+    ) -> Result<(), SweepError> {
+        let mut part = 1.0;
+        let mut fresh = true;
+        loop {
+            let change: Vec<f64> = target.iter().zip(&self.drives_rad).map(|(t, d)| t - d).collect();
+            if change.iter().all(|c| c.abs() < 1e-15) {
+                return Ok(());
+            }
+            let next: Vec<f64> = if part >= 1.0 {
+                target.to_vec()
+            } else {
+                self.drives_rad.iter().zip(&change).map(|(d, c)| d + part * c).collect()
+            };
+            match self.try_step(model, solver, &next, fresh) {
+                Ok(equilibrium) => {
+                    self.equilibrium = equilibrium;
+                    self.drives_rad = next;
+                    fresh = false;
+                    if part >= 1.0 {
+                        return Ok(());
+                    }
+                    // The rest of the way counts as the new whole: try twice the step just made.
+                    part = (2.0 * part / (1.0 - part)).min(1.0);
+                }
+                Err(error) => {
+                    part *= 0.5;
+                    fresh = true;
+                    if part < LEAST_PART {
+                        return Err(Self::lost(model, &self.drives_rad, state, error));
+                    }
+                }
+            }
+        }
+    }
+
+    /// One predicted and corrected step. With `fresh` the solver's factors belong to another state
+    /// and are made anew.
+    fn try_step(
+        &self,
+        model: &Model,
+        solver: &mut Solver,
+        next: &[f64],
+        fresh: bool,
+    ) -> Result<Equilibrium, SolveError> {
+        let mut state: State = self.equilibrium.state.clone();
+        if fresh {
+            state = solver.solve(model, state, &self.drives_rad)?.state;
+        }
+        let mut tangent = DVector::zeros(model.layout.dofs() + model.rows());
+        for (i, (to, from)) in next.iter().zip(&self.drives_rad).enumerate() {
+            tangent += solver.drive_tangent(model, i) * (to - from);
+        }
+        solver.advance(model, &mut state, &tangent, 1.0)?;
+        solver.solve(model, state, next)
+    }
+}

@@ -1,0 +1,140 @@
+//! Bounded Levenberg–Marquardt as an argmin solver: Gauss–Newton matrix plus λ times its diagonal
+//! (Marquardt, J. SIAM 11 (1963) 431), steps from the quadratic model in the box, λ by Nielsen's rule
+//! (IMM-REP-1999-05, Technical University of Denmark).
+
+use super::box_qp::minimize_in_box;
+use super::normal::Normal;
+use super::problem::{Problem, Trial};
+use super::run::Shared;
+use argmin::core::{
+    Error, IterState, KV, Problem as Counted, Solver, State, TerminationReason, TerminationStatus,
+};
+use nalgebra::DVector;
+
+/// The state argmin carries: position in the unit box, gradient, nothing else of its own.
+pub type LmState = IterState<Vec<f64>, Vec<f64>, (), (), (), f64>;
+
+/// λ at the start, relative to the diagonal.
+const START: f64 = 1e-2;
+/// Largest step of a variable in one iteration, in widths of its bounds.
+const TRUST: f64 = 0.25;
+/// Rejected steps before an iteration gives up.
+const TRIES: usize = 12;
+/// Diagonal entries below this part of the largest are lifted to it.
+const FLOOR: f64 = 1e-6;
+/// A step counts when the cost falls by at least this part of what the model promised.
+const ACCEPT: f64 = 1e-4;
+/// The run ends when the cost falls by less than this part over [`WINDOW`] iterations.
+const FALL: f64 = 1e-3;
+/// See [`FALL`].
+const WINDOW: usize = 5;
+
+/// See the module.
+pub struct LevenbergMarquardt<'a, 'd> {
+    shared: &'a Shared<'d>,
+    lambda: f64,
+    growth: f64,
+    current: Option<(Trial<'d>, Normal)>,
+    history: Vec<f64>,
+    stuck: bool,
+}
+
+impl<'a, 'd> LevenbergMarquardt<'a, 'd> {
+    /// A run over the shared problem.
+    pub fn new(shared: &'a Shared<'d>) -> Self {
+        Self { shared, lambda: START, growth: 2.0, current: None, history: Vec::new(), stuck: false }
+    }
+
+    /// The model's step: box around x and trust region together.
+    fn step(&self, normal: &Normal, x: &[f64]) -> Option<DVector<f64>> {
+        let n = x.len();
+        let mut a = normal.gauss_newton.clone();
+        let largest = a.diagonal().amax().max(f64::MIN_POSITIVE);
+        for i in 0..n {
+            a[(i, i)] += self.lambda * a[(i, i)].max(FLOOR * largest);
+        }
+        let lower = DVector::from_fn(n, |i, _| (-x[i]).max(-TRUST));
+        let upper = DVector::from_fn(n, |i, _| (1.0 - x[i]).min(TRUST));
+        minimize_in_box(&a, &normal.gradient, &lower, &upper)
+    }
+}
+
+impl<'d> Solver<&Problem<'d>, LmState> for LevenbergMarquardt<'_, 'd> {
+    fn name(&self) -> &str {
+        "Levenberg-Marquardt in a box"
+    }
+
+    fn init(
+        &mut self,
+        problem: &mut Counted<&Problem<'d>>,
+        mut state: LmState,
+    ) -> Result<(LmState, Option<KV>), Error> {
+        let x = state.take_param().unwrap_or_default();
+        let trial = problem.problem("simulations", |p| Ok(p.simulate(&x)))?;
+        let trial = trial.ok_or_else(|| Error::msg("the start cannot be simulated"))?;
+        let normal = problem.problem("derivatives", |p| Ok(p.differentiate(&trial)))?;
+        let normal = normal.ok_or_else(|| Error::msg("the start cannot be differentiated"))?;
+        self.history.push(trial.cost);
+        self.shared.report(0, &trial);
+        let state = state.param(x).cost(trial.cost).gradient(normal.gradient.as_slice().to_vec());
+        self.current = Some((trial, normal));
+        Ok((state, None))
+    }
+
+    fn next_iter(
+        &mut self,
+        problem: &mut Counted<&Problem<'d>>,
+        state: LmState,
+    ) -> Result<(LmState, Option<KV>), Error> {
+        let Some((trial, normal)) = self.current.take() else {
+            return Err(Error::msg("not initialised"));
+        };
+        let mut accepted = None;
+        for _ in 0..TRIES {
+            if self.shared.cancelled() {
+                break;
+            }
+            let Some(step) = self.step(&normal, &trial.x) else { break };
+            let promised = -(normal.gradient.dot(&step) + 0.5 * step.dot(&(&normal.gauss_newton * &step)));
+            if promised <= f64::EPSILON * trial.cost {
+                break;
+            }
+            let x: Vec<f64> =
+                trial.x.iter().zip(step.iter()).map(|(x, d)| (x + d).clamp(0.0, 1.0)).collect();
+            let next = problem.problem("simulations", |p| Ok(p.simulate(&x)))?;
+            let ratio = next.as_ref().map_or(-1.0, |n| (trial.cost - n.cost) / promised);
+            if ratio > ACCEPT
+                && let Some(next) = next
+                && let Some(derivatives) = problem.problem("derivatives", |p| Ok(p.differentiate(&next)))?
+            {
+                self.lambda *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0);
+                self.growth = 2.0;
+                accepted = Some((next, derivatives));
+                break;
+            }
+            self.lambda *= self.growth;
+            self.growth *= 2.0;
+        }
+        self.stuck = accepted.is_none();
+        let (trial, normal) = accepted.unwrap_or((trial, normal));
+        self.history.push(trial.cost);
+        self.shared.report(self.history.len() - 1, &trial);
+        let state =
+            state.param(trial.x.clone()).cost(trial.cost).gradient(normal.gradient.as_slice().to_vec());
+        self.current = Some((trial, normal));
+        Ok((state, None))
+    }
+
+    fn terminate(&mut self, state: &LmState) -> TerminationStatus {
+        if self.shared.cancelled() {
+            return TerminationStatus::Terminated(TerminationReason::Interrupt);
+        }
+        let settled = self.history.len() > WINDOW
+            && self.history[self.history.len() - 1 - WINDOW] - state.get_cost()
+                <= FALL * self.history[self.history.len() - 1 - WINDOW];
+        if self.stuck || settled {
+            return TerminationStatus::Terminated(TerminationReason::SolverConverged);
+        }
+        TerminationStatus::NotTerminated
+    }
+}

@@ -1,0 +1,48 @@
+//! Normal equations of a weighted sum of squares: what Gauss–Newton and gradient methods both need.
+
+use nalgebra::{DMatrix, DVector};
+
+/// f = ½ Σ w r², its gradient Σ w r ∇r and its Gauss–Newton matrix Σ w ∇r ∇rᵀ, for n parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Normal {
+    /// f.
+    pub cost: f64,
+    /// n.
+    pub gradient: DVector<f64>,
+    /// n × n, lower triangle filled until [`Normal::complete`].
+    pub gauss_newton: DMatrix<f64>,
+}
+
+impl Normal {
+    /// Zero.
+    pub fn new(n: usize) -> Self {
+        Self { cost: 0.0, gradient: DVector::zeros(n), gauss_newton: DMatrix::zeros(n, n) }
+    }
+
+    /// Adds ½ w r² with gradient `row` of r.
+    pub fn add(&mut self, weight: f64, residual: f64, row: &[f64]) {
+        self.cost += 0.5 * weight * residual * residual;
+        for (j, rj) in row.iter().enumerate() {
+            if *rj == 0.0 {
+                continue;
+            }
+            self.gradient[j] += weight * residual * rj;
+            let w = weight * rj;
+            for (i, ri) in row.iter().enumerate().skip(j) {
+                self.gauss_newton[(i, j)] += w * ri;
+            }
+        }
+    }
+
+    /// Adds another sum.
+    pub fn merge(&mut self, other: &Self) {
+        self.cost += other.cost;
+        self.gradient += &other.gradient;
+        self.gauss_newton += &other.gauss_newton;
+    }
+
+    /// Mirrors the lower triangle.
+    pub fn complete(&mut self) {
+        self.gauss_newton.fill_upper_triangle_with_lower_triangle();
+    }
+}

@@ -1,0 +1,191 @@
+//! One optimisation run: argmin's executor around the chosen solver, progress, interruption, and the
+//! best point kept whatever happens.
+
+use super::lbfgs::Unbounded;
+use super::levenberg::LevenbergMarquardt;
+use super::problem::{Problem, Trial};
+use argmin::core::{Executor, State, TerminationReason, TerminationStatus};
+use argmin::solver::linesearch::MoreThuenteLineSearch;
+use argmin::solver::quasinewton::LBFGS;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Pairs L-BFGS remembers.
+const MEMORY: usize = 10;
+
+/// Which solver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Bounded Levenberg–Marquardt.
+    LevenbergMarquardt,
+    /// L-BFGS on sine-transformed variables.
+    Lbfgs,
+}
+
+/// One iteration, for progress.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Iteration {
+    /// 0 is the start.
+    pub number: usize,
+    /// Weighted sum.
+    pub cost: f64,
+    /// Contribution of each term.
+    pub terms: Vec<f64>,
+    /// Largest distance of any trace from its target, mm.
+    pub max_error_mm: f64,
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// By its own stopping rule.
+    Converged,
+    /// At the limit of iterations.
+    Limit,
+    /// By the user.
+    Interrupted,
+    /// The start could not be simulated.
+    NoStart,
+}
+
+/// What a run found.
+#[derive(Clone, Debug)]
+pub struct Optimized {
+    /// Best design parameters.
+    pub p: Vec<f64>,
+    /// Their cost.
+    pub cost: f64,
+    /// Iterations taken.
+    pub iterations: usize,
+    /// Cycles simulated.
+    pub simulations: usize,
+    /// How it ended.
+    pub ending: Ending,
+}
+
+/// What solver, observer and caller share.
+pub struct Shared<'d> {
+    /// The problem.
+    pub problem: Problem<'d>,
+    cancel: &'d AtomicBool,
+    progress: &'d (dyn Fn(&Iteration) + Sync),
+    best: Mutex<Option<(f64, Vec<f64>)>>,
+    latest: Mutex<Option<Iteration>>,
+}
+
+impl<'d> Shared<'d> {
+    /// Whether the user asked to stop.
+    pub fn cancelled(&self) -> bool {
+        self.cancel.load(Ordering::Relaxed)
+    }
+
+    /// Remembers a simulated point if it is the best so far.
+    pub fn keep(&self, trial: &Trial<'d>) {
+        if let Ok(mut best) = self.best.lock()
+            && best.as_ref().is_none_or(|(cost, _)| trial.cost < *cost)
+        {
+            *best = Some((trial.cost, trial.x.clone()));
+            if let Ok(mut latest) = self.latest.lock() {
+                *latest = Some(Iteration {
+                    number: 0,
+                    cost: trial.cost,
+                    terms: trial.terms.clone(),
+                    max_error_mm: trial.max_error_mm(),
+                });
+            }
+        }
+    }
+
+    /// Remembers and announces an accepted iterate.
+    pub fn report(&self, number: usize, trial: &Trial<'d>) {
+        self.keep(trial);
+        self.announce(number);
+    }
+
+    fn announce(&self, number: usize) {
+        let latest = self.latest.lock().ok().and_then(|l| l.clone());
+        if let Some(latest) = latest {
+            (self.progress)(&Iteration { number, ..latest });
+        }
+    }
+}
+
+/// Minimises the design's objective from `start` (design parameters), at most `limit` iterations.
+/// `progress` is called after every iteration; `cancel` ends the run at the next step. The best
+/// point found is returned in every case; the start itself where nothing better was found.
+pub fn optimize<'d>(
+    problem: Problem<'d>,
+    method: Method,
+    start: &[f64],
+    limit: usize,
+    cancel: &'d AtomicBool,
+    progress: &'d (dyn Fn(&Iteration) + Sync),
+) -> Optimized {
+    let x = problem.to_unit(start);
+    let shared = Shared { problem, cancel, progress, best: Mutex::new(None), latest: Mutex::new(None) };
+    let (iterations, ending) = match method {
+        Method::LevenbergMarquardt => levenberg_marquardt(&shared, x, limit),
+        Method::Lbfgs => lbfgs(&shared, &x, limit),
+    };
+    let best = shared.best.lock().ok().and_then(|b| b.clone());
+    let simulations = shared.problem.simulations();
+    match best {
+        // The start itself is returned as it was given, not through the unit box.
+        Some((cost, x)) if x != shared.problem.to_unit(start) => Optimized {
+            p: shared.problem.to_parameters(&x),
+            cost,
+            iterations,
+            simulations,
+            ending,
+        },
+        Some((cost, _)) => Optimized { p: start.to_vec(), cost, iterations, simulations, ending },
+        None => Optimized {
+            p: start.to_vec(),
+            cost: f64::INFINITY,
+            iterations: 0,
+            simulations,
+            ending: if shared.cancelled() { Ending::Interrupted } else { Ending::NoStart },
+        },
+    }
+}
+
+fn levenberg_marquardt(shared: &Shared, x: Vec<f64>, limit: usize) -> (usize, Ending) {
+    let solver = LevenbergMarquardt::new(shared);
+    let run = Executor::new(&shared.problem, solver)
+        .configure(|state| state.param(x).max_iters(limit as u64))
+        .timer(false)
+        .run();
+    match run {
+        Ok(result) => ended(shared, result.state.get_iter() as usize, result.state.get_termination_status()),
+        Err(_) => (0, if shared.cancelled() { Ending::Interrupted } else { Ending::NoStart }),
+    }
+}
+
+fn lbfgs(shared: &Shared, x: &[f64], limit: usize) -> (usize, Ending) {
+    let z = Unbounded::to_z(x);
+    let solver: LBFGS<_, Vec<f64>, Vec<f64>, f64> = LBFGS::new(MoreThuenteLineSearch::new(), MEMORY);
+    let mut done = 0;
+    let mut ending = Ending::Limit;
+    let run = Executor::new(Unbounded::new(shared), solver)
+        .configure(|state| state.param(z).max_iters(limit as u64))
+        .timer(false)
+        .run();
+    if let Ok(result) = run {
+        (done, ending) =
+            ended(shared, result.state.get_iter() as usize, result.state.get_termination_status());
+    } else if shared.cancelled() {
+        ending = Ending::Interrupted;
+    }
+    shared.announce(done);
+    (done, ending)
+}
+
+fn ended(shared: &Shared, iterations: usize, status: &TerminationStatus) -> (usize, Ending) {
+    let ending = match status {
+        _ if shared.cancelled() => Ending::Interrupted,
+        TerminationStatus::Terminated(TerminationReason::MaxItersReached) => Ending::Limit,
+        TerminationStatus::Terminated(TerminationReason::Interrupt) => Ending::Interrupted,
+        _ => Ending::Converged,
+    };
+    (iterations, ending)
+}

@@ -1,0 +1,30 @@
+//! Shared by the integration tests.
+#![allow(dead_code)]
+
+use flexura::elaborate::{FileError, Files};
+use flexura::ir::Design;
+
+/// Files of the Chebyshev example.
+pub struct ExampleFiles;
+
+impl Files for ExampleFiles {
+    fn read(&self, path: &str) -> Result<String, FileError> {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/chebyshev");
+        std::fs::read_to_string(folder.join(path)).map_err(|_| FileError::NotFound)
+    }
+}
+
+/// Every free variable moved from its start by up to a tenth of its bounds, inside them.
+pub fn shaken(design: &Design, seed: u64) -> Vec<f64> {
+    let mut s = seed;
+    design
+        .free
+        .iter()
+        .map(|f| {
+            s = s.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let r = ((s >> 11) as f64) / (1u64 << 53) as f64 - 0.5;
+            let width = f.upper - f.lower;
+            (f.start + 0.2 * r * width).clamp(f.lower + 0.01 * width, f.upper - 0.01 * width)
+        })
+        .collect()
+}

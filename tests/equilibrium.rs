@@ -1,0 +1,164 @@
+//! The compliant mechanism in equilibrium: torque computed two ways, energy over a closed cycle,
+//! independence of the way, derivatives by the design parameters against differences.
+
+use flexura::elaborate::{Options, elaborate};
+use flexura::equilibrium::{Cycle, Layout, Model, SensitivityWorkspace, sweep};
+use flexura::ir::Design;
+use flexura::kinematics::solve_motion;
+use flexura::optimize::Problem;
+
+mod common;
+
+const EDGES: usize = 12;
+
+fn chebyshev(steps: usize) -> Design {
+    let options = Options { steps: Some(steps), ..Options::default() };
+    let files = common::ExampleFiles;
+    let out = elaborate("chebyshev.mech", &files, &options);
+    assert!(out.diagnostics.iter().all(|d| !d.is_error()), "{:?}", out.diagnostics);
+    out.design.unwrap()
+}
+
+fn start(design: &Design) -> Vec<f64> {
+    design.free.iter().map(|f| f.start).collect()
+}
+
+fn layout(design: &Design) -> Layout {
+    let p = start(design);
+    Layout::new(design, &solve_motion(design, &p).unwrap(), &p)
+}
+
+fn cycle(design: &Design, layout: &Layout, p: &[f64]) -> Cycle {
+    sweep(&Model::new(design, layout, p, EDGES, false).unwrap()).unwrap()
+}
+
+/// The multiplier against the central difference of the energy, with its order of convergence.
+#[test]
+fn torque_is_the_derivative_of_the_energy() {
+    let mut errors = Vec::new();
+    for steps in [60, 120] {
+        let design = chebyshev(steps);
+        let layout = layout(&design);
+        let p = start(&design);
+        let model = Model::new(&design, &layout, &p, EDGES, false).unwrap();
+        let states = sweep(&model).unwrap().states;
+        let alpha = &layout.drives[0].values_rad;
+        let mut worst = 0.0f64;
+        let mut largest = 0.0f64;
+        for s in 1..steps {
+            let difference = (states[s + 1].energy_n_mm - states[s - 1].energy_n_mm) / (alpha[s + 1] - alpha[s - 1]);
+            let torque = states[s].torque_n_mm(&model, 0);
+            worst = worst.max((torque - difference).abs());
+            largest = largest.max(torque.abs());
+        }
+        errors.push(worst / largest);
+    }
+    assert!(errors[1] < 5e-3, "{errors:?}");
+    // Central differences converge with second order to the exact torque.
+    assert!((3.3..4.7).contains(&(errors[0] / errors[1])), "{errors:?}");
+}
+
+/// ∮ τ dα = 0 on a closed cycle: the trapezoidal rule on a periodic function converges at once.
+#[test]
+fn a_closed_cycle_takes_no_work() {
+    let design = chebyshev(60);
+    let layout = layout(&design);
+    let p = start(&design);
+    let model = Model::new(&design, &layout, &p, EDGES, false).unwrap();
+    let states = sweep(&model).unwrap().states;
+    let torques: Vec<f64> = states.iter().map(|s| s.torque_n_mm(&model, 0)).collect();
+    let size: f64 = torques[..60].iter().map(|t| t.abs()).sum();
+    let sum: f64 = torques[..60].iter().sum();
+    assert!(sum.abs() < 1e-6 * size, "{sum} of {size}");
+    assert!((torques[0] - torques[60]).abs() < 1e-7 * size);
+    assert!(states.iter().all(|s| s.stable));
+}
+
+/// States do not remember how they were reached.
+#[test]
+fn the_way_does_not_matter() {
+    let (few, many) = (chebyshev(12), chebyshev(60));
+    let p = start(&few);
+    let (a, b) = (layout(&few), layout(&many));
+    let coarse = cycle(&few, &a, &p);
+    let fine = cycle(&many, &b, &p);
+    for s in 0..=12 {
+        for (x, y) in coarse.states[s].state.poses.iter().zip(&fine.states[5 * s].state.poses) {
+            assert!((x.translation - y.translation).norm() < 1e-7, "state {s}");
+            assert!((x.rotation - y.rotation).norm() < 1e-8, "state {s}");
+        }
+    }
+}
+
+/// Link increments, multipliers and torque by every parameter, against central differences.
+#[test]
+fn states_by_parameters_against_differences() {
+    let design = chebyshev(6);
+    let layout = layout(&design);
+    let p = common::shaken(&design, 7);
+    let model = Model::new(&design, &layout, &p, EDGES, true).unwrap();
+    let states = sweep(&model).unwrap().states;
+    let mut workspace = SensitivityWorkspace::new(&model);
+    let step = |i: usize| 1e-4 * (design.free[i].upper - design.free[i].lower);
+    let perturbed = |i: usize, factor: f64| {
+        let mut q = p.clone();
+        q[i] += factor * step(i);
+        cycle(&design, &layout, &q)
+    };
+    let mut worst = 0.0f64;
+    for i in 0..p.len() {
+        let shifted = [perturbed(i, -2.0), perturbed(i, -1.0), perturbed(i, 1.0), perturbed(i, 2.0)];
+        for (s, state) in states.iter().enumerate() {
+            let target: Vec<f64> = layout.drives.iter().map(|d| d.values_rad[s] - d.rest_rad).collect();
+            let sensitivity = workspace.at(&model, state, &target).unwrap();
+            // Five-point differences: error of fourth order in the step.
+            let row = model.rows() - 1;
+            let value = |k: usize| shifted[k].states[s].state.lambda[row];
+            let difference = (value(0) - 8.0 * value(1) + 8.0 * value(2) - value(3)) / (12.0 * step(i));
+            let exact = sensitivity.lambda[(row, i)];
+            let width = design.free[i].upper - design.free[i].lower;
+            let torque = state.state.lambda[row].abs().max(1.0);
+            worst = worst.max((exact - difference).abs() * width / torque);
+            for (b, body) in layout.bodies.iter().enumerate() {
+                let Some(first) = body.first_dof else { continue };
+                for c in 0..3 {
+                    let value = |k: usize| shifted[k].states[s].state.poses[b].translation[c];
+                    let difference = (value(0) - 8.0 * value(1) + 8.0 * value(2) - value(3)) / (12.0 * step(i));
+                    let exact = sensitivity.links[(first + c, i)];
+                    worst = worst.max((exact - difference).abs() * width / layout.length_mm);
+                }
+            }
+        }
+    }
+    assert!(worst < 1e-6, "{worst}");
+}
+
+/// Gradient of the whole objective in the unit box against differences, at random feasible designs.
+#[test]
+fn objective_gradient_against_differences() {
+    let design = chebyshev(6);
+    let layout = layout(&design);
+    let problem = Problem::new(&design, &layout, EDGES);
+    for seed in [3, 11] {
+        let x = problem.to_unit(&common::shaken(&design, seed));
+        let trial = problem.simulate(&x).unwrap();
+        assert!(trial.terms.iter().take(2).all(|t| *t > 0.0), "every term must act: {:?}", trial.terms);
+        let normal = problem.differentiate(&trial).unwrap();
+        let scale = normal.gradient.amax();
+        for i in 0..x.len() {
+            let h = 2e-4;
+            let value = |factor: f64| {
+                let mut y = x.clone();
+                y[i] += factor * h;
+                problem.simulate(&y).unwrap().cost
+            };
+            let difference = (value(-2.0) - 8.0 * value(-1.0) + 8.0 * value(1.0) - value(2.0)) / (12.0 * h);
+            let exact = normal.gradient[i];
+            assert!(
+                (difference - exact).abs() < 1e-6 * scale.max(exact.abs()),
+                "seed {seed}, {}: exact {exact}, difference {difference}",
+                design.free[i].path
+            );
+        }
+    }
+}
