@@ -1,0 +1,183 @@
+//! The conventional mechanism of a design at given values of its free variables: bodies, hinges, drives and traces
+//! in drawing coordinates. Compliant joints count as the conventional joint they replace.
+
+use super::constraint::{Constraint, HingeAngle};
+use crate::diagnostic::Diagnostic;
+use crate::ir::{Design, JointId, JointKind};
+use crate::math::Pose;
+use nalgebra::Vector3;
+
+/// A mechanism in its drawing pose. Scaled unknowns are (du / L, dφ) of every moving body.
+#[derive(Clone, Debug)]
+pub struct Mechanism<'d> {
+    /// The design it was made from.
+    pub design: &'d Design,
+    /// Poses of all bodies as drawn; the centre of a body is the mean of its joint points.
+    pub drawing: Vec<Pose>,
+    /// Constraints with the joint each comes from.
+    pub constraints: Vec<(Constraint, JointId)>,
+    /// Angle of every joint, by [`JointId`].
+    pub angles: Vec<HingeAngle>,
+    /// Physical point of every joint as drawn: with its layer's offset along the axis, mm.
+    pub joint_points: Vec<Vector3<f64>>,
+    /// Body and point as drawn of every trace, mm.
+    pub traces: Vec<(usize, Vector3<f64>)>,
+    /// Characteristic length L, mm: root mean square distance of the joint points from the centres of their bodies.
+    pub length: f64,
+    /// First scaled unknown of every body; none for ground.
+    pub(super) column: Vec<Option<usize>>,
+}
+
+impl<'d> Mechanism<'d> {
+    /// Builds the mechanism at the free variables `p`.
+    ///
+    /// # Errors
+    /// Joints of kinds that cannot be solved yet, geometry that is not finite at `p`, or a design whose indices do
+    /// not fit together.
+    pub fn new(design: &'d Design, p: &[f64]) -> Result<Self, Vec<Diagnostic>> {
+        consistent(design, p)?;
+        let values = design.exprs.values(p);
+        let point = |e: &crate::ir::ExprPoint| {
+            let at =
+                |i: usize| e.get(i).and_then(|id| values.get(id.0 as usize)).copied().unwrap_or(f64::NAN);
+            Vector3::new(at(0), at(1), at(2))
+        };
+        let mut errors = Vec::new();
+        let mut constraints = Vec::new();
+        let mut angles = Vec::new();
+        let mut joint_points = Vec::new();
+        for (id, joint) in design.joints.iter().enumerate() {
+            let axis = Vector3::from(joint.axis);
+            let at = point(&joint.point) + axis * (f64::from(joint.layer) * design.layers.pitch_mm);
+            let finite = at.iter().chain(&axis).all(|x| x.is_finite()) && axis.norm() > 0.5;
+            if !finite {
+                errors.push(not_finite("joint", &joint.name, joint.origin));
+            }
+            match (joint.kind, joint.bodies.as_slice()) {
+                (JointKind::Hinge, &[a, b]) => {
+                    constraints.extend(Constraint::hinge(a, b, at, &axis).map(|c| (c, id)));
+                    angles.push(HingeAngle::new(a, b, &axis));
+                }
+                (JointKind::Hinge, bodies) => errors.push(
+                    Diagnostic::error(
+                        "E0901",
+                        format!("a hinge of {} bodies is not available yet", bodies.len()),
+                        joint.origin,
+                    )
+                    .help("write one hinge for each pair of bodies, at the same point"),
+                ),
+                (kind, _) => errors.push(
+                    Diagnostic::error(
+                        "E0901",
+                        format!("the motion of a {} joint is not available yet", kind_name(kind)),
+                        joint.origin,
+                    )
+                    .help("use hinges only"),
+                ),
+            }
+            joint_points.push(at);
+        }
+        let mut traces = Vec::new();
+        for trace in &design.traces {
+            let at = point(&trace.point);
+            if !at.iter().all(|x| x.is_finite()) {
+                errors.push(not_finite("trace", &trace.name, trace.origin));
+            }
+            traces.push((trace.body, at));
+        }
+        if !errors.is_empty() {
+            return Err(errors);
+        }
+        let mut column = Vec::new();
+        let mut next = 0;
+        for body in &design.bodies {
+            column.push((!body.ground).then_some(next));
+            next += if body.ground { 0 } else { 6 };
+        }
+        let (drawing, length) = centers(design, &joint_points, &traces);
+        Ok(Self { design, drawing, constraints, angles, joint_points, traces, length, column })
+    }
+
+    /// Number of bodies that can move.
+    pub fn moving_bodies(&self) -> usize {
+        self.column.iter().flatten().count()
+    }
+
+    /// Number of scaled unknowns: six a moving body.
+    pub fn unknowns(&self) -> usize {
+        6 * self.moving_bodies()
+    }
+
+    /// Positions of all traces, mm.
+    pub fn trace_points(&self, poses: &[Pose]) -> Vec<Vector3<f64>> {
+        self.traces.iter().map(|(body, point)| poses[*body].point(point)).collect()
+    }
+
+    /// Angle of every joint on the branch nearest `near`, rad.
+    pub fn joint_angles(&self, poses: &[Pose], near: &[f64]) -> Vec<f64> {
+        self.angles.iter().zip(near).map(|(angle, near)| angle.value(poses, *near)).collect()
+    }
+}
+
+/// Centres of all bodies (mean of their joint points; of a body without joints, of its traces) and the
+/// characteristic length.
+fn centers(
+    design: &Design,
+    joint_points: &[Vector3<f64>],
+    traces: &[(usize, Vector3<f64>)],
+) -> (Vec<Pose>, f64) {
+    let mut square = 0.0;
+    let mut count = 0;
+    let mut poses = Vec::new();
+    for (id, body) in design.bodies.iter().enumerate() {
+        let own = |(joint, at): (&crate::ir::Joint, &Vector3<f64>)| joint.bodies.contains(&id).then_some(*at);
+        let mut points: Vec<_> = design.joints.iter().zip(joint_points).filter_map(own).collect();
+        if points.is_empty() {
+            points.extend(traces.iter().filter(|t| t.0 == id).map(|t| t.1));
+        }
+        let center = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
+        if !body.ground {
+            square += points.iter().map(|p| (p - center).norm_squared()).sum::<f64>();
+            count += points.len();
+        }
+        poses.push(Pose::rest(center));
+    }
+    let length = (square / count.max(1) as f64).sqrt();
+    (poses, if length > 0.0 { length } else { 1.0 })
+}
+
+/// Indices of a design may come from a file: nothing below may trip over them.
+fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
+    let body = |id: &usize| *id < design.bodies.len();
+    let joints = design.joints.iter().all(|j| j.bodies.iter().all(body));
+    let drives = design.drives.iter().all(|d| d.joint < design.joints.len());
+    let traces = design.traces.iter().all(|t| body(&t.body));
+    let problem = if p.len() != design.free.len() {
+        "the number of free values is not the design's"
+    } else if !(joints && drives && traces) {
+        "the design refers to bodies or joints it does not have"
+    } else if design.cycle.steps == 0 {
+        "the cycle has no steps"
+    } else {
+        return Ok(());
+    };
+    Err(vec![Diagnostic::error("E0500", problem, design.origin)])
+}
+
+fn not_finite(what: &str, name: &str, origin: crate::ir::Origin) -> Diagnostic {
+    let message = format!("the place of {what} `{name}` is not a finite number");
+    Diagnostic::error("E0501", message, origin)
+        .label("no such point at these values of the free variables")
+        .help("check the lengths of the circles it is found from")
+}
+
+fn kind_name(kind: JointKind) -> &'static str {
+    match kind {
+        JointKind::Hinge => "hinge",
+        JointKind::Ball => "ball",
+        JointKind::Universal => "universal",
+        JointKind::Slider => "slider",
+        JointKind::Cylindrical => "cylindrical",
+        JointKind::Fixed => "fixed",
+    }
+}

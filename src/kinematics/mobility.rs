@@ -1,0 +1,150 @@
+//! Mobility by rank: freedoms = 6 · moving bodies − rank of the constraints at a generic pose. Counting joints
+//! (Grübler, Kutzbach) fails for every planar loop in space and for Bennett's linkage; rank does not.
+
+use super::linear::{Rank, Rows, moved};
+use super::mechanism::Mechanism;
+use super::path::correct;
+use crate::diagnostic::Diagnostic;
+use crate::math::Pose;
+use nalgebra::DVector;
+
+/// How far the mechanism is nudged (drives, rad; or its free motions, scaled) to leave a pose that is special only as
+/// drawn.
+const NUDGE: f64 = 0.02;
+/// A body takes part in a null motion when its share exceeds this part of the largest. Measured: shares of bodies
+/// at rest stay below 1e-13.
+const TAKES_PART: f64 = 1e-6;
+
+/// The freedoms of a mechanism.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mobility {
+    /// Bodies that are not ground.
+    pub moving_bodies: usize,
+    /// Independent motions with the drives released.
+    pub freedoms: usize,
+    /// Number of drives.
+    pub drives: usize,
+    /// Scalar constraint equations.
+    pub rows: usize,
+    /// How many of them follow from the others.
+    pub redundant: usize,
+    /// Motions left when all drives are held: zero for a determined mechanism.
+    pub undetermined: usize,
+    /// Bodies that take part in those.
+    pub loose_bodies: Vec<usize>,
+}
+
+impl Mobility {
+    /// Mobility of a mechanism at a generic pose near the drawing.
+    pub fn of(mechanism: &Mechanism) -> Self {
+        let drives = mechanism.design.drives.len();
+        let mut best: Option<(Rank, Rank)> = None;
+        let mut consider = |at: &[Pose]| {
+            let drive: Vec<f64> =
+                mechanism.design.drives.iter().map(|d| mechanism.angles[d.joint].value(at, 0.0)).collect();
+            let rows = Rows::at(mechanism, at, &drive);
+            let (free, held) = (rows.rank(false), rows.rank(true));
+            if best.as_ref().is_none_or(|(f, h)| (free.rank, held.rank) > (f.rank, h.rank)) {
+                best = Some((free, held));
+            }
+        };
+        // As drawn, then nudged: a pose that is special (flat, folded, a dead point) has too small a rank.
+        consider(&mechanism.drawing);
+        let drawn = Rows::at(mechanism, &mechanism.drawing, &[]).rank(false);
+        for sign in [NUDGE, -NUDGE] {
+            // Unequal shares, so that two freedoms do not stay in a special relation.
+            let share = |i: usize| sign / (1.0 + 0.37 * i as f64);
+            let along = drawn.null.iter().enumerate().map(|(i, v)| v * share(i));
+            let start = moved(mechanism, &mechanism.drawing, &along.fold(zeros(mechanism), |sum, v| sum + v));
+            if let Some(at) = correct(mechanism, &start, &[]) {
+                consider(&at.poses);
+            }
+            let drive: Vec<f64> = (0..drives).map(share).collect();
+            if let Some(at) = correct(mechanism, &mechanism.drawing, &drive) {
+                consider(&at.poses);
+            }
+        }
+        let moving_bodies = mechanism.moving_bodies();
+        let Some((free, held)) = best else {
+            return Self {
+                moving_bodies,
+                freedoms: 0,
+                drives,
+                rows: 0,
+                redundant: 0,
+                undetermined: 0,
+                loose_bodies: Vec::new(),
+            };
+        };
+        Self {
+            moving_bodies,
+            freedoms: mechanism.unknowns() - free.rank,
+            drives,
+            rows: free.rows,
+            redundant: free.rows - free.rank,
+            undetermined: held.null.len(),
+            loose_bodies: loose(mechanism, &held),
+        }
+    }
+
+    /// What is wrong with it, if anything.
+    pub fn diagnose(&self, mechanism: &Mechanism) -> Option<Diagnostic> {
+        let design = mechanism.design;
+        let counted = format!("mobility {}, drives {}", self.freedoms, self.drives);
+        let at = design.drives.first().map_or(design.origin, |d| d.origin);
+        let first_loose = self.loose_bodies.first().and_then(|b| design.bodies.get(*b));
+        if self.undetermined > 0 {
+            let names =
+                names(self.loose_bodies.iter().filter_map(|b| design.bodies.get(*b)).map(|b| &b.name));
+            let message = if self.freedoms > self.drives {
+                format!("{counted}: with the drives held, {names} can still move")
+            } else {
+                format!("{counted}, but the drives do not determine the motion: {names} can still move")
+            };
+            let place = first_loose.map_or(at, |b| b.origin);
+            let mut found = Diagnostic::error("E0502", message, place).label("still free to move");
+            if self.drives > 0 {
+                found = found.also(at, "driven here");
+            }
+            let missing = self.undetermined;
+            return Some(found.help(format!(
+                "drive {missing} more joint{}, or join the loose bodies to others",
+                if missing == 1 { "" } else { "s" }
+            )));
+        }
+        if self.freedoms < self.drives {
+            let message = if self.freedoms == 0 {
+                format!("{counted}: the joints leave no motion at all")
+            } else {
+                format!("{counted}: the drives work against each other")
+            };
+            return Some(Diagnostic::error("E0502", message, at).label("cannot be turned").help(
+                "remove a drive, or a joint: a loop moves when its hinge axes are parallel or meet in one point",
+            ));
+        }
+        None
+    }
+}
+
+fn zeros(mechanism: &Mechanism) -> DVector<f64> {
+    DVector::zeros(mechanism.unknowns())
+}
+
+/// Bodies with a share in the null motions.
+fn loose(mechanism: &Mechanism, held: &Rank) -> Vec<usize> {
+    let share =
+        |column: &usize| held.null.iter().map(|v| v.rows(*column, 6).norm_squared()).sum::<f64>().sqrt();
+    let shares: Vec<f64> = mechanism.column.iter().map(|c| c.as_ref().map_or(0.0, share)).collect();
+    let largest = shares.iter().fold(0.0, |m, s| f64::max(m, *s));
+    (0..shares.len()).filter(|i| shares[*i] > TAKES_PART * largest && largest > 0.0).collect()
+}
+
+/// `a`, `b` and `c`
+pub(super) fn names<'a>(all: impl Iterator<Item = &'a String>) -> String {
+    let mut quoted: Vec<String> = all.map(|n| format!("`{n}`")).collect();
+    match quoted.pop() {
+        Some(last) if !quoted.is_empty() => format!("{} and {last}", quoted.join(", ")),
+        Some(last) => last,
+        None => "nothing".into(),
+    }
+}

@@ -1,0 +1,498 @@
+//! The conventional mechanism against independent reference motions and closed forms.
+
+use flexura::diagnostic::Diagnostic;
+use flexura::ir::expr::ExprGraph;
+use flexura::ir::{
+    Body, Cycle, Design, Drive, ExprPoint, Joint, JointKind, Layers, Material, NamedPoint, Origin, Process,
+    Profile, Realization, Trace,
+};
+use flexura::kinematics::{Mechanism, Mobility, Motion, solve_motion};
+use nalgebra::Vector3;
+
+type V = Vector3<f64>;
+
+/// Builds designs as elaboration would, each declaration with an origin of its own.
+struct Builder(Design);
+
+impl Builder {
+    fn new(name: &str) -> Self {
+        Self(Design {
+            name: name.into(),
+            exprs: ExprGraph::default(),
+            free: Vec::new(),
+            bodies: Vec::new(),
+            joints: Vec::new(),
+            rods: Vec::new(),
+            drives: Vec::new(),
+            cycle: Cycle { steps: 60, duration_s: 2.0, origin: origin(9, 0) },
+            traces: Vec::new(),
+            objectives: Vec::new(),
+            requirements: Vec::new(),
+            material: Material {
+                name: "m".into(),
+                e_mpa: 1900.0,
+                nu: 0.4,
+                density_g_mm3: None,
+                strength_mpa: None,
+                yield_mpa: None,
+                strain_once: None,
+                strain_repeated: None,
+            },
+            process: Process { name: "p".into(), least_wall_mm: 0.6, clearance_mm: 0.5 },
+            layers: Layers { height_mm: 5.0, pitch_mm: 5.5, axis: [0.0, 0.0, 1.0] },
+            exports: Vec::new(),
+            origin: origin(9, 9),
+        })
+    }
+
+    fn point(&mut self, at: V) -> ExprPoint {
+        [at.x, at.y, at.z].map(|x| self.0.exprs.constant(x))
+    }
+
+    fn body(&mut self, name: &str, ground: bool, layer: i32) -> usize {
+        let id = self.0.bodies.len();
+        let skeleton: Vec<NamedPoint> = Vec::new();
+        self.0.bodies.push(Body { name: name.into(), ground, skeleton, layer, origin: origin(1, id) });
+        id
+    }
+
+    fn hinge(
+        &mut self,
+        name: &str,
+        [a, b]: [usize; 2],
+        at: V,
+        axis: V,
+        layer: i32,
+        compliant: bool,
+    ) -> usize {
+        let id = self.0.joints.len();
+        let point = self.point(at);
+        let realization = if compliant {
+            Realization::Compliant { template: "crossed_leaves".into(), rods: Vec::new() }
+        } else {
+            Realization::Conventional { pin_diameter_mm: None }
+        };
+        self.0.joints.push(Joint {
+            name: name.into(),
+            kind: JointKind::Hinge,
+            bodies: vec![a, b],
+            point,
+            axis: axis.into(),
+            layer,
+            toward: Vec::new(),
+            realization,
+            origin: origin(2, id),
+        });
+        id
+    }
+
+    fn drive(&mut self, joint: usize, from_deg: f64, to_deg: f64, rest_deg: f64) {
+        let id = self.0.drives.len();
+        self.0.drives.push(Drive {
+            name: self.0.joints[joint].name.clone(),
+            joint,
+            profile: Profile::Range { from_rad: from_deg.to_radians(), to_rad: to_deg.to_radians() },
+            rest_rad: rest_deg.to_radians(),
+            motor: None,
+            continuous: true,
+            origin: origin(3, id),
+        });
+    }
+
+    fn trace(&mut self, name: &str, body: usize, at: V) {
+        let point = self.point(at);
+        self.0.traces.push(Trace { name: name.into(), body, point, origin: origin(4, 0) });
+    }
+}
+
+fn origin(file: u32, item: usize) -> Origin {
+    let start = 10 * item as u32;
+    Origin { file, start, end: start + 5 }
+}
+
+fn xy(x: f64, y: f64) -> V {
+    V::new(x, y, 0.0)
+}
+
+fn polar(r: f64, degrees: f64) -> V {
+    xy(r * degrees.to_radians().cos(), r * degrees.to_radians().sin())
+}
+
+/// Intersection of two circles left (side 1) or right (side −1) of the ray a → b.
+fn meet(a: V, ra: f64, b: V, rb: f64, side: f64) -> V {
+    let d = b - a;
+    let l = d.norm();
+    let x = (l * l + ra * ra - rb * rb) / (2.0 * l);
+    let y = side * (ra * ra - x * x).sqrt();
+    a + d / l * x + V::z().cross(&d) / l * y
+}
+
+fn solved(design: &Design) -> Motion {
+    solve_motion(design, &[]).unwrap_or_else(|errors| panic!("{errors:#?}"))
+}
+
+fn mobility(design: &Design) -> Mobility {
+    Mobility::of(&Mechanism::new(design, &[]).unwrap())
+}
+
+fn chebyshev(compliant_pin: bool) -> Design {
+    let r = 20.0;
+    let (o, d, a) = (xy(0.0, 0.0), xy(2.0 * r, 0.0), polar(r, 90.0));
+    let b = meet(a, 2.5 * r, d, 2.5 * r, 1.0);
+    let mut m = Builder::new("chebyshev_lambda");
+    let base = m.body("base", true, -2);
+    let crank = m.body("crank", false, -1);
+    let coupler = m.body("coupler", false, 0);
+    let rocker = m.body("rocker", false, 0);
+    let motor = m.hinge("motor", [base, crank], o, V::z(), -1, false);
+    m.hinge("pin", [crank, coupler], a, V::z(), -1, compliant_pin);
+    m.hinge("knee", [coupler, rocker], b, V::z(), 0, true);
+    m.hinge("heel", [rocker, base], d, V::z(), 0, true);
+    m.drive(motor, 0.0, 360.0, 30.0);
+    m.trace("tip", coupler, a + (b - a) * 2.0);
+    m.0
+}
+
+fn jansen() -> Design {
+    let (o, g) = (xy(0.0, 0.0), xy(-38.0, -7.8));
+    let a = polar(15.0, 0.0);
+    let t = meet(a, 50.0, g, 41.5, -1.0);
+    let l = meet(a, 61.9, g, 39.3, 1.0);
+    let e = meet(g, 40.1, t, 55.8, 1.0);
+    let f = meet(e, 39.4, l, 36.7, -1.0);
+    let h = meet(l, 49.0, f, 65.7, 1.0);
+    let mut m = Builder::new("jansen");
+    let base = m.body("base", true, -2);
+    let crank = m.body("crank", false, -1);
+    let [j, k, upper, link_f, c, lower] = ["j", "k", "upper", "f", "c", "lower"].map(|n| m.body(n, false, 0));
+    let motor = m.hinge("motor", [base, crank], o, V::z(), -1, false);
+    m.hinge("pin", [crank, k], a, V::z(), -1, false);
+    m.hinge("wrist", [k, j], a, V::z(), 0, true);
+    m.hinge("top", [j, upper], t, V::z(), 0, true);
+    m.hinge("hip", [base, upper], g, V::z(), 0, true);
+    m.hinge("hip_c", [base, c], g, V::z(), 0, true);
+    m.hinge("back", [upper, link_f], e, V::z(), 0, true);
+    m.hinge("heel", [link_f, lower], f, V::z(), 0, true);
+    m.hinge("knee", [c, k], l, V::z(), 0, true);
+    m.hinge("knee_lower", [c, lower], l, V::z(), 0, true);
+    m.drive(motor, 0.0, 360.0, 132.0);
+    m.trace("foot", lower, h);
+    m.0
+}
+
+/// Four-bar O–A–B–D in the plane, drawn with the crank at `angle` (deg).
+fn four_bar(crank: f64, coupler: f64, rocker: f64, base: f64, angle: f64, side: f64) -> Builder {
+    let (o, d, a) = (xy(0.0, 0.0), xy(base, 0.0), polar(crank, angle));
+    let b = meet(a, coupler, d, rocker, side);
+    let mut m = Builder::new("four_bar");
+    let ids = [("base", true), ("crank", false), ("coupler", false), ("rocker", false)];
+    let [base, crank, coupler, rocker] = ids.map(|(n, ground)| m.body(n, ground, 0));
+    m.hinge("motor", [base, crank], o, V::z(), 0, false);
+    m.hinge("pin", [crank, coupler], a, V::z(), 0, false);
+    m.hinge("knee", [coupler, rocker], b, V::z(), 0, true);
+    m.hinge("heel", [rocker, base], d, V::z(), 0, true);
+    m.trace("knee", coupler, b);
+    m
+}
+
+fn check_reference(design: &Design, csv: &str) {
+    let motion = solved(design);
+    let rows: Vec<Vec<f64>> =
+        csv.lines().skip(1).map(|l| l.split(',').map(|x| x.parse().unwrap()).collect()).collect();
+    assert_eq!(rows.len(), 61);
+    assert_eq!(motion.states.len(), 61);
+    let mut worst: f64 = 0.0;
+    for (row, state) in rows.iter().zip(&motion.states) {
+        assert!((row[0] - state.drive_rad[0]).abs() < 1e-8);
+        worst = worst.max((V::new(row[1], row[2], row[3]) - state.traces_mm[0]).norm());
+    }
+    println!("{}: worst {worst:e} mm", design.name);
+    assert!(worst < 1e-6, "{worst} mm");
+    assert!(motion.warnings.is_empty(), "{:#?}", motion.warnings);
+    // The joints are closed too, not only the trace right.
+    let mechanism = Mechanism::new(design, &[]).unwrap();
+    for state in motion.states.iter().chain([&motion.rest]) {
+        let mut gap = [0.0; 3];
+        for (constraint, _) in &mechanism.constraints {
+            constraint.residual(&state.poses, &mut gap);
+            assert!(gap.iter().take(constraint.rows()).all(|x| x.abs() < 1e-10), "{gap:?}");
+        }
+    }
+}
+
+#[test]
+fn chebyshev_matches_the_reference() {
+    let design = chebyshev(false);
+    check_reference(&design, include_str!("reference/motion/chebyshev.csv"));
+    let found = mobility(&design);
+    assert_eq!((found.moving_bodies, found.freedoms, found.rows, found.redundant), (3, 1, 20, 3));
+}
+
+#[test]
+fn jansen_matches_the_reference() {
+    let design = jansen();
+    check_reference(&design, include_str!("reference/motion/jansen.csv"));
+    let found = mobility(&design);
+    assert_eq!((found.moving_bodies, found.freedoms, found.rows, found.redundant), (7, 1, 50, 9));
+}
+
+#[test]
+fn rest_pose_is_on_the_branch_and_spans_are_measured_from_it() {
+    // 53 deg as drawn against 41 deg at 30 deg, 128 against 67 at 132 deg: known from independent planar trials.
+    for (design, drawn, rest) in [(chebyshev(false), 53.0, 41.0), (jansen(), 128.0, 67.0)] {
+        let motion = solved(&design);
+        let largest = |motion: &Motion| {
+            let spans = motion.compliant_spans(&design);
+            spans.iter().fold(0.0, |m: f64, s| m.max(s.from_rest_rad)).to_degrees()
+        };
+        assert!((largest(&motion) - rest).abs() < 1.0, "{} deg", largest(&motion));
+        let mut as_drawn = motion.clone();
+        as_drawn.rest = motion.states[0].clone();
+        assert!((largest(&as_drawn) - drawn).abs() < 1.0, "{} deg", largest(&as_drawn));
+    }
+    // Chebyshev's state 5 of 60 is 30 deg: the rest pose.
+    let motion = solved(&chebyshev(false));
+    for (a, b) in motion.rest.poses.iter().zip(&motion.states[5].poses) {
+        assert!((a.translation - b.translation).norm() < 1e-10 && (a.rotation - b.rotation).norm() < 1e-12);
+    }
+}
+
+#[test]
+fn compliant_pin_that_turns_fully_is_an_error_at_the_pin() {
+    let errors = solve_motion(&chebyshev(true), &[]).unwrap_err();
+    assert_eq!(errors.len(), 1);
+    assert_eq!(errors[0].code, "E0504");
+    assert_eq!(errors[0].labels[0].at, origin(2, 1));
+    let help = errors[0].help.as_deref().unwrap();
+    assert!(help.contains("`motor` and `pin` turn fully"), "{help}");
+}
+
+#[test]
+fn parallelogram_is_redundant_and_keeps_its_branch_through_the_change_points() {
+    let mut m = four_bar(20.0, 50.0, 20.0, 50.0, 60.0, 1.0);
+    // The other assembly is the crossed one: make sure the parallelogram was drawn.
+    m.0.joints[2].point = m.point(polar(20.0, 60.0) + xy(50.0, 0.0));
+    m.drive(0, 0.0, 360.0, 30.0);
+    m.0.joints.iter_mut().for_each(|j| j.realization = Realization::Conventional { pin_diameter_mm: None });
+    let found = mobility(&m.0);
+    assert_eq!((found.freedoms, found.redundant), (1, 3));
+    let motion = solved(&m.0);
+    // State 20 is 120 deg on from 60: exactly flat, and state 50 again.
+    for (i, state) in motion.states.iter().enumerate() {
+        let exact = polar(20.0, 60.0 + 6.0 * i as f64) + xy(50.0, 0.0);
+        let path = m.0.traces[0].body;
+        assert_eq!(path, 2);
+        let knee = state.poses[2].point(&(polar(20.0, 60.0) + xy(50.0, 0.0)));
+        assert!((knee - exact).norm() < 1e-9, "state {i}: {:e}", (knee - exact).norm());
+    }
+    assert_eq!(motion.warnings.len(), 1, "{:#?}", motion.warnings);
+    assert_eq!(motion.warnings[0].code, "E0506");
+    assert!(motion.warnings[0].message.contains("120.0 deg"), "{}", motion.warnings[0].message);
+}
+
+#[test]
+fn three_parallel_cranks_move_though_counting_says_they_cannot() {
+    let mut m = Builder::new("double_parallelogram");
+    let base = m.body("base", true, 0);
+    let bar = m.body("bar", false, 0);
+    let mut motor = 0;
+    for (i, x) in [0.0, 40.0, 75.0].into_iter().enumerate() {
+        let crank = m.body(&format!("crank{i}"), false, 0);
+        let hinge = m.hinge(&format!("foot{i}"), [base, crank], xy(x, 0.0), V::z(), 0, false);
+        m.hinge(&format!("head{i}"), [crank, bar], xy(x, 0.0) + polar(15.0, 70.0), V::z(), 0, false);
+        motor = if i == 0 { hinge } else { motor };
+    }
+    m.drive(motor, 0.0, 90.0, 0.0);
+    m.trace("bar", bar, xy(10.0, 30.0));
+    // Even in the plane 3·4 − 2·6 = 0.
+    let found = mobility(&m.0);
+    assert_eq!((found.freedoms, found.rows, found.redundant), (1, 30, 7));
+    let motion = solved(&m.0);
+    let swung = polar(15.0, 160.0) - polar(15.0, 70.0);
+    assert!((motion.states[60].traces_mm[0] - (xy(10.0, 30.0) + swung)).norm() < 1e-9);
+}
+
+/// Bennett's linkage: opposite links equal, a / sin α = b / sin β.
+fn bennett() -> Design {
+    let (a, alpha, beta) = (40.0_f64, 40.0_f64.to_radians(), 75.0_f64.to_radians());
+    let b = a * beta.sin() / alpha.sin();
+    // Denavit–Hartenberg chain with the joint angles related by
+    // tan(θ₁/2) tan(θ₂/2) = sin((β+α)/2) / sin((β−α)/2), θ₃ = −θ₁, θ₄ = −θ₂.
+    let theta1 = 100.0_f64.to_radians();
+    let k = ((beta + alpha) / 2.0).sin() / ((beta - alpha) / 2.0).sin();
+    let theta2 = 2.0 * (k / (theta1 / 2.0).tan()).atan();
+    let mut frame = nalgebra::Isometry3::identity();
+    let mut joints = Vec::new();
+    for (theta, length, twist) in
+        [(theta1, a, alpha), (theta2, b, beta), (-theta1, a, alpha), (-theta2, b, beta)]
+    {
+        joints.push((frame.translation.vector, frame.rotation * V::z()));
+        let turn = nalgebra::Isometry3::rotation(V::z() * theta);
+        let shift = nalgebra::Isometry3::translation(length, 0.0, 0.0);
+        frame = frame * turn * shift * nalgebra::Isometry3::rotation(V::x() * twist);
+    }
+    assert!(frame.translation.vector.norm() < 1e-12 && frame.rotation.angle() < 1e-12, "{frame}");
+    let mut m = Builder::new("bennett");
+    let ids = [("base", true), ("crank", false), ("coupler", false), ("rocker", false)];
+    let bodies = ids.map(|(n, ground)| m.body(n, ground, 0));
+    for (i, (at, axis)) in joints.iter().enumerate() {
+        m.hinge(&format!("h{i}"), [bodies[i], bodies[(i + 1) % 4]], *at, *axis, 0, false);
+    }
+    m.drive(0, 0.0, 360.0, 20.0);
+    m.trace("far", bodies[2], joints[2].0);
+    m.0
+}
+
+#[test]
+fn bennett_moves_though_counting_says_minus_two() {
+    let design = bennett();
+    let found = mobility(&design);
+    assert_eq!((found.freedoms, found.rows, found.redundant), (1, 20, 3));
+    let motion = solved(&design);
+    assert!(motion.warnings.is_empty(), "{:#?}", motion.warnings);
+    // The input–output relation holds all the way round: tan(θ₁/2) tan(θ₂/2) = const.
+    let (alpha, beta) = (40.0_f64.to_radians(), 75.0_f64.to_radians());
+    let k = ((beta + alpha) / 2.0).sin() / ((beta - alpha) / 2.0).sin();
+    let theta1 = 100.0_f64.to_radians();
+    let theta2 = 2.0 * (k / (theta1 / 2.0).tan()).atan();
+    let sign = |s: f64, t: f64| {
+        let (u, v) = ((theta1 + s * motion.states[7].angles_rad[0]) / 2.0, (theta2 + t) / 2.0);
+        (u.sin() * v.sin() - k * u.cos() * v.cos()).abs()
+    };
+    // Joint 0 turns link 1 against link 0: about its axis the DH angle of the joint changes with one sign for all.
+    let t = motion.states[7].angles_rad[1];
+    let least =
+        [(1.0, t), (1.0, -t), (-1.0, t), (-1.0, -t)].map(|(s, t)| sign(s, t)).into_iter().fold(1.0, f64::min);
+    assert!(least < 1e-9, "{least}");
+    // Opposite joints turn equally.
+    for state in &motion.states {
+        let a = &state.angles_rad;
+        assert!((a[0].abs() - a[2].abs()).abs() < 1e-9 && (a[1].abs() - a[3].abs()).abs() < 1e-9, "{a:?}");
+    }
+}
+
+#[test]
+fn skew_four_hinge_loop_is_locked() {
+    let mut design = bennett();
+    design.joints[2].axis = (V::from(design.joints[2].axis) + V::new(0.2, 0.0, 0.1)).normalize().into();
+    let errors = solve_motion(&design, &[]).unwrap_err();
+    assert_eq!(errors[0].code, "E0502");
+    assert!(errors[0].message.starts_with("mobility 0, drives 1"), "{}", errors[0].message);
+}
+
+#[test]
+fn underdriven_five_bar_names_the_loose_bodies() {
+    let mut m = Builder::new("five_bar");
+    let base = m.body("base", true, 0);
+    let links = ["left", "mid", "right", "last"].map(|n| m.body(n, false, 0));
+    let at = [xy(0.0, 0.0), xy(-10.0, 30.0), xy(20.0, 55.0), xy(50.0, 28.0), xy(40.0, 0.0)];
+    let around = [base, links[0], links[1], links[2], links[3], base];
+    for (i, p) in at.iter().enumerate() {
+        m.hinge(&format!("h{i}"), [around[i], around[i + 1]], *p, V::z(), 0, false);
+    }
+    m.drive(0, 0.0, 20.0, 0.0);
+    let errors = solve_motion(&m.0, &[]).unwrap_err();
+    assert_eq!(errors.len(), 1);
+    assert_eq!(errors[0].code, "E0502");
+    assert_eq!(
+        errors[0].message,
+        "mobility 2, drives 1: with the drives held, `mid`, `right` and `last` can still move"
+    );
+    assert_eq!(errors[0].labels[0].at, origin(1, 2));
+    // With its second drive it moves.
+    m.drive(4, 0.0, -15.0, 0.0);
+    assert_eq!(solved(&m.0).mobility.freedoms, 2);
+}
+
+#[test]
+fn too_many_drives_is_an_error() {
+    let mut m = four_bar(20.0, 50.0, 50.0, 40.0, 90.0, 1.0);
+    m.drive(0, 0.0, 10.0, 0.0);
+    m.drive(3, 0.0, 10.0, 0.0);
+    let errors = solve_motion(&m.0, &[]).unwrap_err();
+    assert!(errors[0].message.starts_with("mobility 1, drives 2"), "{}", errors[0].message);
+}
+
+#[test]
+fn loop_that_breaks_is_reported_where_it_breaks() {
+    // |A − D| ≤ coupler + rocker: breaks where cos θ = (crank² + base² − (coupler + rocker)²) / (2 crank base).
+    for (crank, coupler, rocker, base, drawn) in
+        [(60.0, 35.0, 30.0, 40.0, 40.0), (30.0, 20.0, 40.0, 55.0, 35.0), (80.0, 50.0, 45.0, 60.0, 35.0)]
+    {
+        for side in [1.0, -1.0] {
+            let mut m = four_bar(crank, coupler, rocker, base, drawn, side);
+            m.drive(0, 0.0, 360.0, 0.0);
+            let reach: f64 = coupler + rocker;
+            let cosine: f64 = (crank * crank + base * base - reach * reach) / (2.0 * crank * base);
+            let exact = cosine.acos().to_degrees() - drawn;
+            let errors = solve_motion(&m.0, &[]).unwrap_err();
+            assert_eq!(errors[0].code, "E0503");
+            let said: f64 = errors[0]
+                .message
+                .strip_prefix("the mechanism cannot be assembled beyond `motor` = ")
+                .and_then(|s| s.strip_suffix(" deg"))
+                .unwrap_or_else(|| panic!("{}", errors[0].message))
+                .parse()
+                .unwrap();
+            assert!((said - exact).abs() < 0.01, "{said} {exact}");
+            assert_eq!(errors[0].labels[0].at, origin(2, 0));
+            assert_eq!(errors[0].labels[1].at, origin(3, 0));
+            assert!(errors[0].labels[2].text.contains("`knee`"), "{:?}", errors[0].labels);
+        }
+    }
+    // And on the way to the rest pose.
+    let mut m = four_bar(60.0, 35.0, 30.0, 40.0, 40.0, 1.0);
+    m.drive(0, 0.0, 5.0, 170.0);
+    let errors = solve_motion(&m.0, &[]).unwrap_err();
+    assert!(errors[0].message.contains("on the way to the rest pose at `motor` = 170.00 deg"), "{errors:?}");
+}
+
+#[test]
+fn drawing_at_a_dead_point_is_said() {
+    // The rocker drives; crank and coupler stand in line as drawn.
+    let (o, d) = (xy(0.0, 0.0), xy(40.0, 0.0));
+    let b = meet(o, 70.0, d, 50.0, 1.0);
+    let a = b * (20.0 / 70.0);
+    let mut m = Builder::new("toggle");
+    let ids = [("base", true), ("crank", false), ("coupler", false), ("rocker", false)];
+    let [base, crank, coupler, rocker] = ids.map(|(n, ground)| m.body(n, ground, 0));
+    m.hinge("free", [base, crank], o, V::z(), 0, false);
+    m.hinge("pin", [crank, coupler], a, V::z(), 0, false);
+    m.hinge("knee", [coupler, rocker], b, V::z(), 0, false);
+    let heel = m.hinge("heel", [rocker, base], d, V::z(), 0, false);
+    m.drive(heel, 0.0, -10.0, 0.0);
+    let errors = solve_motion(&m.0, &[]).unwrap_err();
+    assert_eq!(errors[0].code, "E0505", "{errors:?}");
+}
+
+#[test]
+fn other_kinds_and_bad_data_are_diagnostics() {
+    let mut design = chebyshev(false);
+    design.joints[2].kind = JointKind::Ball;
+    design.joints[3].bodies.push(1);
+    let errors = solve_motion(&design, &[]).unwrap_err();
+    let codes: Vec<&str> = errors.iter().map(|e: &Diagnostic| e.code.as_str()).collect();
+    assert_eq!(codes, ["E0901", "E0901"]);
+    assert_eq!((errors[0].labels[0].at, errors[1].labels[0].at), (origin(2, 2), origin(2, 3)));
+    let mut design = chebyshev(false);
+    design.joints[1].bodies[1] = 77;
+    assert_eq!(solve_motion(&design, &[]).unwrap_err()[0].code, "E0500");
+    let design = chebyshev(false);
+    assert_eq!(solve_motion(&design, &[1.0]).unwrap_err()[0].code, "E0500");
+    let mut design = chebyshev(false);
+    design.traces[0].point[0] = design.exprs.constant(f64::NAN);
+    assert_eq!(solve_motion(&design, &[]).unwrap_err()[0].code, "E0501");
+}
+
+#[test]
+fn coarse_cycle_meets_the_same_states_as_a_fine_one() {
+    let fine = solved(&jansen());
+    let mut design = jansen();
+    design.cycle.steps = 4;
+    let coarse = solved(&design);
+    for (state, same) in coarse.states.iter().zip(fine.states.iter().step_by(15)) {
+        assert!((state.traces_mm[0] - same.traces_mm[0]).norm() < 1e-9);
+        let turned = state.angles_rad.iter().zip(&same.angles_rad);
+        assert!(turned.clone().all(|(a, b)| (a - b).abs() < 1e-10), "{turned:?}");
+    }
+}
