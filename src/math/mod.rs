@@ -1,5 +1,7 @@
-//! Small shared mathematics: rotations, rigid poses, dense symmetric indefinite factors.
+//! Small shared mathematics: rotations, rigid poses, dual numbers, banded and dense factors.
 
+pub mod banded;
+pub mod dual;
 mod ldlt;
 mod pose;
 

@@ -1,1 +1,221 @@
-//! (being written)
+//! One rod: rest shape, frames, energy, gradient, Hessian, condensation onto its two links,
+//! sensitivities, stress. Discrete elastic rods (Bergou et al. 2008, 2010; Megaro et al. 2017, sec. 3.1)
+//! with clamps at the midpoints of the first and last edge.
+//!
+//! # Model
+//!
+//! N edges on vertices x₀..x_N, e_j = x_{j+1} − x_j, a material frame (m₁, m₂, t) per edge. Edges 0 and
+//! N − 1 are rigidly part of links A and B. Internal freedoms, interleaved: θ₁, x₂, θ₂, x₃, …, x_{N−2},
+//! θ_{N−2} (4N − 11 numbers). Links move by increments (du, dφ) of [`Pose`](crate::math::Pose); the 12
+//! link freedoms of a rod are ordered du_A, dφ_A, du_B, dφ_B. Energies N·mm, forces N, moments N·mm.
+//!
+//! Every derivative holds in the chart centred at the present state: frames are carried along by parallel
+//! transport of their edge and turned by θ, and links by exp(dφ), starting from zero.
+//!
+//! # Use
+//!
+//! ```
+//! use flexura::math::Pose;
+//! use flexura::rod::{Rod, RodMaterial, RodParameters, RodSystem};
+//! use nalgebra::{SVector, Vector3};
+//!
+//! let q = RodParameters::straight(Vector3::zeros(), Vector3::x() * 30.0, Vector3::z(), 0.4, 2.5);
+//! let rod = Rod::new(&q, RodMaterial { e_mpa: 1500.0, nu: 0.4 }, 20)?;
+//! let mut state = rod.rest_state();
+//! let mut system = RodSystem::new(&rod);
+//! let a = Pose::rest(Vector3::zeros());
+//! let b = Pose::rest(Vector3::x() * 30.0);
+//! system.assemble(&rod, &state, &a, &b);
+//! let report = system.factor();
+//! assert_eq!(report.negative_pivots, 0);
+//! let (gradient, hessian) = system.condense();
+//! assert!(gradient.norm() < 1e-9 && hessian[(6, 6)] > 0.0);
+//! // Move link B by 0.1 mm sideways: the rod follows to first order, then is solved again.
+//! let mut d = SVector::<f64, 12>::zeros();
+//! d[7] = 0.1;
+//! let increment = system.back_substitute(&d).to_vec();
+//! let b = b.retract(&Vector3::new(0.0, 0.1, 0.0), &Vector3::zeros());
+//! rod.retract(&mut state, &increment, &a, &b)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Per iteration: [`RodSystem::assemble`], [`RodSystem::factor`], [`RodSystem::condense`], solve for the
+//! links, [`RodSystem::back_substitute`], [`Rod::retract`]. At an equilibrium of a rod made by
+//! [`Rod::with_derivatives`]: [`RodSystem::parameter_columns`], [`RodSystem::internal_sensitivity`].
+
+mod assemble;
+mod condense;
+#[cfg(test)]
+mod derivative_tests;
+mod rest;
+mod section;
+mod state;
+mod stencil;
+
+pub use assemble::RodSystem;
+pub use condense::FactorReport;
+pub use rest::{MIN_EDGES, PARAMETERS, RodError, RodParameters};
+pub use section::{RodMaterial, Stiffness, ellipse_stiffness};
+pub use state::{RetractError, RodState};
+
+use crate::math::dual::Dual;
+use nalgebra::Vector3;
+use rest::{RestShape, rest_shape};
+
+/// A rod: its rest shape and stiffnesses, and on demand their derivatives by the 17 parameters.
+#[derive(Clone, Debug)]
+pub struct Rod {
+    parameters: RodParameters,
+    material: RodMaterial,
+    edges: usize,
+    length: f64,
+    rest: RodState,
+    /// |ē_j|, mm.
+    edge_lengths: Vec<f64>,
+    /// Length w_j|ē_j| over which edge j is stretched: 1.5 |ē_j| for the first and last free edge.
+    stretch_lengths: Vec<f64>,
+    /// Stretch stiffness EA per edge, N.
+    ea: Vec<f64>,
+    /// Voronoi lengths per vertex (entry 0 unused), mm.
+    voronoi: Vec<f64>,
+    /// κ̄₁, κ̄₂, τ̄ per vertex (entry 0 unused), rad.
+    rest_measures: Vec<[f64; 3]>,
+    /// EI₁/l̄, EI₂/l̄, GJ/l̄ per vertex (entry 0 unused), N·mm.
+    vertex_stiffness: Vec<[f64; 3]>,
+    /// Semi-axes (a, b) per edge, mm.
+    sections: Vec<[f64; 2]>,
+    derivatives: Option<Box<RestShape<Dual<PARAMETERS>>>>,
+}
+
+/// Factor on the rest length over which edge `j` of `n` is stretched: the first and last free edge carry
+/// the half edges inside the clamps too, so that the axial compliance is L/EA at every N.
+fn stretch_factor(j: usize, n: usize) -> f64 {
+    if j == 1 || j == n - 2 { 1.5 } else { 1.0 }
+}
+
+impl Rod {
+    /// A rod of elliptic section with `edges` edges.
+    ///
+    /// # Errors
+    /// When the rest shape cannot be built: see [`RodError`].
+    pub fn new(q: &RodParameters, material: RodMaterial, edges: usize) -> Result<Self, RodError> {
+        Self::build(q, material, edges, None)
+    }
+
+    /// As [`Self::new`], with the derivatives of the rest shape that the sensitivities need.
+    ///
+    /// # Errors
+    /// See [`RodError`].
+    pub fn with_derivatives(
+        q: &RodParameters,
+        material: RodMaterial,
+        edges: usize,
+    ) -> Result<Self, RodError> {
+        let mut rod = Self::build(q, material, edges, None)?;
+        let plain = q.to_array();
+        let dual: [Dual<PARAMETERS>; PARAMETERS] = std::array::from_fn(|i| Dual::variable(plain[i], i));
+        rod.derivatives = Some(Box::new(rest_shape(&dual, &material, edges, None)?));
+        Ok(rod)
+    }
+
+    /// A rod with section stiffnesses given instead of computed from a and b (which then only serve the
+    /// stresses). It has no derivatives by its parameters.
+    ///
+    /// # Errors
+    /// See [`RodError`].
+    pub fn with_stiffness(
+        q: &RodParameters,
+        material: RodMaterial,
+        edges: usize,
+        stiffness: Stiffness,
+    ) -> Result<Self, RodError> {
+        Self::build(q, material, edges, Some(stiffness))
+    }
+
+    fn build(
+        q: &RodParameters,
+        material: RodMaterial,
+        edges: usize,
+        stiffness: Option<Stiffness>,
+    ) -> Result<Self, RodError> {
+        let shape = rest_shape::<f64>(&q.to_array(), &material, edges, stiffness)?;
+        let vertex_stiffness = (0..edges)
+            .map(|i| {
+                if i == 0 {
+                    return [0.0; 3];
+                }
+                let (s, r) = (&shape.stiffness[i - 1], &shape.stiffness[i]);
+                [s.ei1 + r.ei1, s.ei2 + r.ei2, s.gj + r.gj].map(|x| 0.5 * x / shape.voronoi[i])
+            })
+            .collect();
+        let stretch_lengths =
+            shape.edge_lengths.iter().enumerate().map(|(j, l)| l * stretch_factor(j, edges)).collect();
+        Ok(Self {
+            parameters: *q,
+            material,
+            edges,
+            length: shape.length,
+            rest: RodState {
+                vertices: shape.vertices.iter().map(|v| Vector3::from(*v)).collect(),
+                m1: shape.m1.iter().map(|v| Vector3::from(*v)).collect(),
+            },
+            stretch_lengths,
+            ea: shape.stiffness.iter().map(|s| s.ea).collect(),
+            edge_lengths: shape.edge_lengths,
+            voronoi: shape.voronoi,
+            rest_measures: shape.measures,
+            vertex_stiffness,
+            sections: shape.sections,
+            derivatives: None,
+        })
+    }
+
+    /// The parameters it was built from.
+    pub fn parameters(&self) -> &RodParameters {
+        &self.parameters
+    }
+
+    /// Its material.
+    pub fn material(&self) -> &RodMaterial {
+        &self.material
+    }
+
+    /// Number of edges N.
+    pub fn edges(&self) -> usize {
+        self.edges
+    }
+
+    /// Number of internal freedoms, 4N − 11.
+    pub fn internal_freedoms(&self) -> usize {
+        4 * self.edges - 11
+    }
+
+    /// Arc length of the rest curve between the attachment planes, mm.
+    pub fn length_mm(&self) -> f64 {
+        self.length
+    }
+
+    /// Edge length h = L/(N − 1), mm.
+    pub fn edge_length_mm(&self) -> f64 {
+        self.length / (self.edges - 1) as f64
+    }
+
+    /// Least bending stiffness over the rod, N·mm².
+    pub fn least_bending_stiffness(&self) -> f64 {
+        (1..self.edges)
+            .map(|i| self.voronoi[i] * self.vertex_stiffness[i][0].min(self.vertex_stiffness[i][1]))
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Largest bending stiffness over the rod, N·mm².
+    pub fn largest_bending_stiffness(&self) -> f64 {
+        (1..self.edges)
+            .map(|i| self.voronoi[i] * self.vertex_stiffness[i][0].max(self.vertex_stiffness[i][1]))
+            .fold(0.0, f64::max)
+    }
+
+    /// The unstressed state, with both links in their rest pose.
+    pub fn rest_state(&self) -> RodState {
+        self.rest.clone()
+    }
+}

@@ -1,0 +1,371 @@
+//! Assembly of a rod's energy, gradient and banded Hessian.
+//!
+//! All coordinates of a rod form one banded sequence of 4N + 3 numbers: e₀, θ₀, x₁ (what link A carries),
+//! θ₁, x₂, θ₂, …, x_{N−2}, θ_{N−2} (internal), x_{N−1}, θ_{N−1}, e_{N−1} (what link B carries). Slot k of
+//! three numbers begins at 4k, θ_j is number 4j + 3; the half bandwidth is 10 throughout.
+
+use super::stencil::{Block, EdgeFrame, Local, VertexMeasures};
+use super::{Rod, RodState};
+use crate::math::Pose;
+use crate::math::banded::{BandColumn, BandedLdl, COLUMN, HALF_BANDWIDTH};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+/// First internal coordinate in the banded sequence: θ₁.
+pub(crate) const FIRST_INTERNAL: usize = 7;
+/// Internal coordinates that one end couples to.
+pub(crate) const END_COUPLING: usize = 8;
+/// Jacobian of the seven coordinates an end carries by (du, dφ) of its link.
+pub(crate) type EndJacobian = SMatrix<f64, 7, 6>;
+
+/// Preallocated workspace of one rod: assembled system, factors, condensation.
+#[derive(Clone, Debug)]
+pub struct RodSystem {
+    pub(crate) n: usize,
+    pub(crate) energy: f64,
+    pub(crate) frames: Vec<EdgeFrame>,
+    pub(crate) measures: Vec<VertexMeasures>,
+    edge_gradient: Vec<Local>,
+    edge_hessian: Vec<Block>,
+    mixed: Vec<Block>,
+    /// Axial force EA ε per edge, N.
+    pub(crate) axial_force: Vec<f64>,
+    pub(crate) gradient: Vec<f64>,
+    pub(crate) band: Vec<BandColumn>,
+    /// Moment arms of x₁ and x_{N−1} from their link's centre.
+    pub(crate) arms: [Vector3<f64>; 2],
+    pub(crate) jacobians: [EndJacobian; 2],
+    pub(crate) link_gradient: SVector<f64, 12>,
+    pub(crate) link_hessian: SMatrix<f64, 12, 12>,
+    pub(crate) factors: BandedLdl,
+    /// Columns 0..6: L⁻¹ of the coupling to link A; column 6: L⁻¹ of the internal gradient.
+    pub(crate) reduced: Vec<[f64; 8]>,
+    /// L⁻¹ of the coupling to link B, whose rows before the last [`END_COUPLING`] are zero.
+    pub(crate) reduced_b: [[f64; 6]; END_COUPLING],
+    pub(crate) condensed_gradient: SVector<f64, 12>,
+    pub(crate) condensed_hessian: SMatrix<f64, 12, 12>,
+    pub(crate) solution: Vec<[f64; 1]>,
+    pub(crate) increment: Vec<f64>,
+    pub(crate) twist_scale: f64,
+}
+
+/// Position of the numbers of an end in its seven coordinates (x, θ, e).
+pub(crate) fn end_coordinates(end: usize, n: usize) -> [usize; 7] {
+    if end == 0 {
+        [4, 5, 6, 3, 0, 1, 2]
+    } else {
+        let x = 4 * (n - 1);
+        [x, x + 1, x + 2, x + 3, x + 4, x + 5, x + 6]
+    }
+}
+
+/// Coefficients of slots j and j + 1 in e_j: the end slots hold edges, the others vertices.
+pub(crate) fn slot_signs(j: usize, n: usize) -> [f64; 2] {
+    if j == 0 {
+        [1.0, 0.0]
+    } else if j == n - 1 {
+        [0.0, 1.0]
+    } else {
+        [-1.0, 1.0]
+    }
+}
+
+/// Cross-product matrix of `v`, negated: d(φ × v)/dφ.
+fn minus_skew(v: &Vector3<f64>) -> Matrix3<f64> {
+    -crate::math::skew(v)
+}
+
+impl RodSystem {
+    /// Workspace for rods with as many edges as `rod`.
+    pub fn new(rod: &Rod) -> Self {
+        let n = rod.edges;
+        let internal = rod.internal_freedoms();
+        Self {
+            n,
+            energy: 0.0,
+            frames: vec![EdgeFrame::ZERO; n],
+            measures: vec![VertexMeasures::ZERO; n],
+            edge_gradient: vec![[0.0; 4]; n],
+            edge_hessian: vec![[[0.0; 4]; 4]; n],
+            mixed: vec![[[0.0; 4]; 4]; n],
+            axial_force: vec![0.0; n],
+            gradient: vec![0.0; 4 * n + 3],
+            band: vec![[0.0; COLUMN]; 4 * n + 3],
+            arms: [Vector3::zeros(); 2],
+            jacobians: [EndJacobian::zeros(); 2],
+            link_gradient: SVector::zeros(),
+            link_hessian: SMatrix::zeros(),
+            factors: BandedLdl::new(internal),
+            reduced: vec![[0.0; 8]; internal + HALF_BANDWIDTH],
+            reduced_b: [[0.0; 6]; END_COUPLING],
+            condensed_gradient: SVector::zeros(),
+            condensed_hessian: SMatrix::zeros(),
+            solution: vec![[0.0; 1]; internal + HALF_BANDWIDTH],
+            increment: vec![0.0; internal],
+            twist_scale: 1.0,
+        }
+    }
+
+    /// Energy of the last assembled state, N·mm.
+    pub fn energy(&self) -> f64 {
+        self.energy
+    }
+
+    /// Gradient by the internal freedoms (θ₁, x₂, θ₂, …), N·mm and N.
+    pub fn internal_gradient(&self) -> &[f64] {
+        &self.gradient[FIRST_INTERNAL..4 * self.n - 4]
+    }
+
+    /// Gradient by the links' increments with the internal freedoms held (forces N, moments N·mm about the
+    /// links' moved centres): what the links must exert on the rod, not yet condensed.
+    pub fn link_gradient(&self) -> &SVector<f64, 12> {
+        &self.link_gradient
+    }
+
+    /// Euclidean norm of the internal gradient with moments divided by the edge length, N.
+    pub fn internal_residual_norm(&self) -> f64 {
+        let square: f64 = self
+            .internal_gradient()
+            .iter()
+            .enumerate()
+            .map(|(i, g)| if i % 4 == 0 { g / self.twist_scale } else { *g })
+            .map(|g| g * g)
+            .sum();
+        square.sqrt()
+    }
+
+    /// Largest internal force (resultant over the edges, clamped ones left out), N.
+    pub fn largest_internal_force(&self) -> f64 {
+        (1..self.n - 1)
+            .map(|j| {
+                let g = &self.edge_gradient[j];
+                (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]).sqrt() / self.frames[j].l
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// Force below which the residual is rounding: 64 ε (|x|/h)(EI_max/h² + EA), N.
+    pub fn rounding_floor(&self, rod: &Rod, state: &RodState) -> f64 {
+        let h = rod.edge_length_mm();
+        let x = state.vertices.iter().map(|v| v.amax()).fold(0.0, f64::max);
+        let ea = rod.ea.iter().copied().fold(0.0, f64::max);
+        64.0 * f64::EPSILON * (x / h) * (rod.largest_bending_stiffness() / (h * h) + ea)
+    }
+
+    /// Assembles energy, gradient and Hessian of `rod` at `state`, whose clamps must agree with the poses.
+    /// Not finite where consecutive edges fold back on each other.
+    pub fn assemble(&mut self, rod: &Rod, state: &RodState, pose_a: &Pose, pose_b: &Pose) {
+        debug_assert_eq!(self.n, rod.edges);
+        let n = self.n;
+        self.twist_scale = rod.edge_length_mm();
+        self.local_terms(rod, state);
+        self.gradient.fill(0.0);
+        self.band.fill([0.0; COLUMN]);
+        for j in 0..n {
+            self.scatter_edge(j);
+        }
+        for i in 1..n {
+            self.scatter_mixed(i);
+        }
+        for (end, pose) in [pose_a, pose_b].into_iter().enumerate() {
+            let vertex = if end == 0 { 1 } else { n - 1 };
+            self.arms[end] = state.vertices[vertex] - (pose.center + pose.translation);
+            self.link_terms(end);
+        }
+    }
+
+    /// Energies with derivatives in the edges' local coordinates.
+    fn local_terms(&mut self, rod: &Rod, state: &RodState) {
+        let n = self.n;
+        self.energy = 0.0;
+        let zipped = self.frames.iter_mut().zip(state.vertices.windows(2)).zip(&state.m1);
+        for ((frame, x), m1) in zipped {
+            *frame = EdgeFrame::new(&x[0], &x[1], m1);
+        }
+        for (j, frame) in self.frames.iter().enumerate() {
+            let mut g = [0.0; 4];
+            let mut h = [[0.0; 4]; 4];
+            self.axial_force[j] = 0.0;
+            if j > 0 && j < n - 1 {
+                let stretch = frame.l - rod.edge_lengths[j];
+                let force = rod.ea[j] * stretch / rod.stretch_lengths[j];
+                self.axial_force[j] = force;
+                self.energy += 0.5 * force * stretch;
+                g[2] = force * frame.l;
+                h[0][0] = force * frame.l;
+                h[1][1] = h[0][0];
+                h[2][2] = rod.ea[j] / rod.stretch_lengths[j] * frame.l * frame.l;
+            }
+            self.edge_gradient[j] = g;
+            self.edge_hessian[j] = h;
+        }
+        for i in 1..n {
+            let measures = VertexMeasures::new(&self.frames[i - 1], &self.frames[i]);
+            let term = measures.energy(&rod.vertex_stiffness[i], &rod.rest_measures[i]);
+            self.measures[i] = measures;
+            self.energy += term.energy;
+            add_local(&mut self.edge_gradient[i - 1], &term.g_before);
+            add_local(&mut self.edge_gradient[i], &term.g_after);
+            add_block(&mut self.edge_hessian[i - 1], &term.before);
+            add_block(&mut self.edge_hessian[i], &term.after);
+            self.mixed[i] = term.mixed;
+        }
+    }
+
+    /// Columns of the map from a local to a spatial covector of edge `j`: (m₁, m₂, t)/|e|.
+    pub(crate) fn edge_basis(&self, j: usize) -> Matrix3<f64> {
+        let f = &self.frames[j];
+        Matrix3::from_columns(&[f.m1, f.m2, f.t]) / f.l
+    }
+
+    /// Adds gradient and diagonal block of edge `j` to the banded system.
+    fn scatter_edge(&mut self, j: usize) {
+        let basis = self.edge_basis(j);
+        let g = &self.edge_gradient[j];
+        let h = &self.edge_hessian[j];
+        let force = basis * Vector3::new(g[0], g[1], g[2]);
+        let sym = Matrix3::new(
+            h[0][0], h[1][0], h[2][0], //
+            h[1][0], h[1][1], h[2][1], //
+            h[2][0], h[2][1], h[2][2],
+        );
+        let block = basis * sym * basis.transpose();
+        let turn = basis * Vector3::new(h[3][0], h[3][1], h[3][2]);
+        let signs = slot_signs(j, self.n);
+        let theta = 4 * j + 3;
+        self.gradient[theta] += g[3];
+        self.band[theta][0] += h[3][3];
+        for (s, sign) in signs.into_iter().enumerate() {
+            if sign == 0.0 {
+                continue;
+            }
+            let slot = 4 * (j + s);
+            for c in 0..3 {
+                self.gradient[slot + c] += sign * force[c];
+                for r in c..3 {
+                    self.band[slot + c][r - c] += block[(r, c)];
+                }
+                // θ_j comes after slot j and before slot j + 1.
+                let (row, column) = if s == 0 { (theta, slot + c) } else { (slot + c, theta) };
+                self.band[column][row - column] += sign * turn[c];
+            }
+        }
+        let both = signs[0] * signs[1];
+        if both != 0.0 {
+            for c in 0..3 {
+                for r in 0..3 {
+                    self.band[4 * j + c][4 + r - c] += both * block[(r, c)];
+                }
+            }
+        }
+    }
+
+    /// Adds the block between edges `i − 1` and `i`.
+    fn scatter_mixed(&mut self, i: usize) {
+        let m = &self.mixed[i];
+        let (basis0, basis1) = (self.edge_basis(i - 1), self.edge_basis(i));
+        let inner = Matrix3::from_fn(|r, c| m[r][c]);
+        // Rows: edge i, columns: edge i − 1, as the lower triangle wants them.
+        let block = basis1 * inner.transpose() * basis0.transpose();
+        let turn0 = basis1 * Vector3::new(m[3][0], m[3][1], m[3][2]);
+        let turn1 = basis0 * Vector3::new(m[0][3], m[1][3], m[2][3]);
+        let (s0, s1) = (slot_signs(i - 1, self.n), slot_signs(i, self.n));
+        let (theta0, theta1) = (4 * i - 1, 4 * i + 3);
+        self.band[theta0][4] += m[3][3];
+        for (a, sign) in s1.into_iter().enumerate() {
+            // θ_{i−1} with the slots of edge i.
+            let slot = 4 * (i + a);
+            for c in 0..3 {
+                self.band[theta0][slot + c - theta0] += sign * turn0[c];
+            }
+        }
+        for (a, sign) in s0.into_iter().enumerate() {
+            // θ_i with the slots of edge i − 1.
+            let slot = 4 * (i - 1 + a);
+            for c in 0..3 {
+                self.band[slot + c][theta1 - slot - c] += sign * turn1[c];
+            }
+        }
+        for (a, sign1) in s1.into_iter().enumerate() {
+            for (b, sign0) in s0.into_iter().enumerate() {
+                let sign = sign0 * sign1;
+                if sign == 0.0 {
+                    continue;
+                }
+                let (row, column) = (4 * (i + a), 4 * (i - 1 + b));
+                for c in 0..3 {
+                    for r in 0..3 {
+                        if row > column {
+                            self.band[column + c][row + r - column - c] += sign * block[(r, c)];
+                        } else if r >= c {
+                            self.band[column + c][r - c] += sign * (block[(r, c)] + block[(c, r)]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Gradient and Hessian of one end by its link's increment: x = c + u + exp(φ)r, e = exp(φ)ê,
+    /// θ = φ·t̂ up to third order.
+    fn link_terms(&mut self, end: usize) {
+        let n = self.n;
+        let index = end_coordinates(end, n);
+        let frame = &self.frames[if end == 0 { 0 } else { n - 1 }];
+        let (r, e) = (self.arms[end], frame.t * frame.l);
+        let mut jacobian = EndJacobian::zeros();
+        jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
+        jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&minus_skew(&r));
+        jacobian.fixed_view_mut::<1, 3>(3, 3).copy_from(&frame.t.transpose());
+        jacobian.fixed_view_mut::<3, 3>(4, 3).copy_from(&minus_skew(&e));
+        let g = SVector::<f64, 7>::from_fn(|i, _| self.gradient[index[i]]);
+        let h = SMatrix::<f64, 7, 7>::from_fn(|i, j| {
+            let (row, column) = (index[i].max(index[j]), index[i].min(index[j]));
+            self.band[column][row - column]
+        });
+        let mut hessian = jacobian.transpose() * h * jacobian;
+        for (g, v) in [(g.fixed_rows::<3>(0), &r), (g.fixed_rows::<3>(4), &e)] {
+            let outer = g * v.transpose();
+            let second = (outer + outer.transpose()) * 0.5 - Matrix3::identity() * g.dot(v);
+            let mut block = hessian.fixed_view_mut::<3, 3>(3, 3);
+            block += second;
+        }
+        self.link_gradient.fixed_rows_mut::<6>(6 * end).copy_from(&(jacobian.transpose() * g));
+        self.link_hessian.fixed_view_mut::<6, 6>(6 * end, 6 * end).copy_from(&hessian);
+        self.jacobians[end] = jacobian;
+    }
+}
+
+impl Rod {
+    /// Elastic energy of a state, N·mm.
+    pub fn energy(&self, state: &RodState) -> f64 {
+        let mut energy = 0.0;
+        let mut previous: Option<EdgeFrame> = None;
+        for (j, (x, m1)) in state.vertices.windows(2).zip(&state.m1).enumerate().take(self.edges) {
+            let frame = EdgeFrame::new(&x[0], &x[1], m1);
+            if j > 0 && j < self.edges - 1 {
+                let stretch = frame.l - self.edge_lengths[j];
+                energy += 0.5 * self.ea[j] * stretch * stretch / self.stretch_lengths[j];
+            }
+            if let Some(p) = &previous {
+                let values = VertexMeasures::new(p, &frame).value;
+                for ((v, r), b) in values.iter().zip(&self.rest_measures[j]).zip(&self.vertex_stiffness[j]) {
+                    energy += 0.5 * b * (v - r) * (v - r);
+                }
+            }
+            previous = Some(frame);
+        }
+        energy
+    }
+}
+
+fn add_local(to: &mut Local, from: &Local) {
+    for (t, f) in to.iter_mut().zip(from) {
+        *t += f;
+    }
+}
+
+fn add_block(to: &mut Block, from: &Block) {
+    for (t, f) in to.iter_mut().zip(from) {
+        add_local(t, f);
+    }
+}

@@ -1,0 +1,191 @@
+//! Static condensation of a rod onto the twelve freedoms of its two links, with inertia and shift.
+//!
+//! With K the internal Hessian, C its coupling to the links and g the gradients, the links see
+//! H − Cᵀ K⁻¹ C and g_link − Cᵀ K⁻¹ g_int. Only forward solves are needed: Cᵀ K⁻¹ C = (L⁻¹C)ᵀ D⁻¹ (L⁻¹C),
+//! and the coupling to link B touches the last eight rows only.
+
+use super::assemble::{END_COUPLING, FIRST_INTERNAL, RodSystem, end_coordinates};
+use crate::math::banded::HALF_BANDWIDTH;
+use nalgebra::{SMatrix, SVector};
+
+/// First shift tried, relative to the largest diagonal entry of the vertices.
+const FIRST_SHIFT: f64 = 1e-6;
+/// Growth of the shift from one try to the next.
+const SHIFT_GROWTH: f64 = 8.0;
+/// Most shifts tried: 1e-6 · 8¹² exceeds any diagonal by far.
+const MAX_SHIFTS: usize = 13;
+
+/// Outcome of a factorisation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FactorReport {
+    /// Pivots of the unshifted internal Hessian that are not positive: its number of negative eigenvalues.
+    pub negative_pivots: usize,
+    /// Shift added to the diagonal (N/mm; times h² for twists), 0 if none.
+    pub shift: f64,
+    /// Least pivot relative to its diagonal entry, unshifted: near 1e-14 the rod is at a critical point.
+    pub smallest_pivot_ratio: f64,
+    /// Whether the factors in use are of a positive definite (perhaps shifted) matrix.
+    pub positive_definite: bool,
+}
+
+impl RodSystem {
+    /// Factors the internal Hessian; if it is not positive definite, shifts it until it is. The same
+    /// shifted matrix then serves [`Self::condense`] and [`Self::back_substitute`].
+    pub fn factor(&mut self) -> FactorReport {
+        let mut report = self.factor_unshifted();
+        if report.positive_definite {
+            return report;
+        }
+        let internal = FIRST_INTERNAL..4 * self.n - 4;
+        let diagonal = internal.clone().filter(|i| i % 4 != 3).map(|i| self.band[i][0].abs());
+        let mut shift = FIRST_SHIFT * diagonal.fold(0.0, f64::max);
+        let twist = self.twist_scale * self.twist_scale;
+        for _ in 0..MAX_SHIFTS {
+            let matrix = &self.band[internal.clone()];
+            let scaled = |i: usize| if i % 4 == 0 { shift * twist } else { shift };
+            if self.factors.factor(matrix, scaled) == 0 {
+                report.shift = shift;
+                report.positive_definite = true;
+                return report;
+            }
+            shift *= SHIFT_GROWTH;
+        }
+        report
+    }
+
+    /// Factors the internal Hessian as it is, for the inertia at an accepted state and for sensitivities.
+    pub fn factor_unshifted(&mut self) -> FactorReport {
+        let negative = self.factors.factor(&self.band[FIRST_INTERNAL..4 * self.n - 4], |_| 0.0);
+        FactorReport {
+            negative_pivots: negative,
+            shift: 0.0,
+            smallest_pivot_ratio: self.factors.smallest_pivot_ratio(),
+            positive_definite: negative == 0,
+        }
+    }
+
+    /// Coupling of the first (end 0) or last (end 1) eight internal coordinates to an end's link.
+    pub(crate) fn coupling(&self, end: usize) -> SMatrix<f64, END_COUPLING, 6> {
+        self.end_coupling(end) * self.jacobians[end]
+    }
+
+    /// The same before the chain rule: by the seven coordinates the end carries.
+    pub(crate) fn end_coupling(&self, end: usize) -> SMatrix<f64, END_COUPLING, 7> {
+        let index = end_coordinates(end, self.n);
+        let first = if end == 0 { FIRST_INTERNAL } else { 4 * self.n - 4 - END_COUPLING };
+        SMatrix::from_fn(|i, j| {
+            let (row, column) = ((first + i).max(index[j]), (first + i).min(index[j]));
+            if row - column <= HALF_BANDWIDTH { self.band[column][row - column] } else { 0.0 }
+        })
+    }
+
+    /// Condenses the factored system onto the links: gradient (12) and Hessian (12 by 12), ordered du_A,
+    /// dφ_A, du_B, dφ_B. Call after [`Self::factor`] or [`Self::factor_unshifted`].
+    pub fn condense(&mut self) -> (&SVector<f64, 12>, &SMatrix<f64, 12, 12>) {
+        let n = self.factors.order();
+        let (a, b) = (self.coupling(0), self.coupling(1));
+        self.reduced.fill([0.0; 8]);
+        for (row, g) in self.reduced.iter_mut().zip(&self.gradient[FIRST_INTERNAL..4 * self.n - 4]) {
+            row[6] = *g;
+        }
+        for (i, row) in self.reduced.iter_mut().enumerate().take(END_COUPLING) {
+            for (c, value) in row.iter_mut().enumerate().take(6) {
+                *value = a[(i, c)];
+            }
+        }
+        self.factors.forward(&mut self.reduced, 0);
+        let first_b = n - END_COUPLING;
+        self.forward_b(&b);
+
+        let inverse = self.factors.inverse_pivots();
+        let mut aa = SMatrix::<f64, 7, 7>::zeros();
+        for (y, d) in self.reduced.iter().zip(inverse) {
+            for c in 0..7 {
+                let s = y[c] * d;
+                for r in c..7 {
+                    aa[(r, c)] += s * y[r];
+                }
+            }
+        }
+        let mut ba = SMatrix::<f64, 6, 7>::zeros();
+        let mut bb = SMatrix::<f64, 6, 6>::zeros();
+        for (i, yb) in self.reduced_b.iter().enumerate() {
+            let d = inverse[first_b + i];
+            let ya = &self.reduced[first_b + i];
+            for r in 0..6 {
+                let s = yb[r] * d;
+                for c in 0..7 {
+                    ba[(r, c)] += s * ya[c];
+                }
+                for c in 0..6 {
+                    bb[(r, c)] += s * yb[c];
+                }
+            }
+        }
+        self.condensed_gradient = self.link_gradient;
+        self.condensed_hessian = self.link_hessian;
+        for i in 0..6 {
+            self.condensed_gradient[i] -= aa[(6, i)];
+            self.condensed_gradient[6 + i] -= ba[(i, 6)];
+            for j in 0..6 {
+                self.condensed_hessian[(i, j)] -= aa[(i.max(j), i.min(j))];
+                self.condensed_hessian[(6 + i, 6 + j)] -= 0.5 * (bb[(i, j)] + bb[(j, i)]);
+                self.condensed_hessian[(6 + i, j)] = -ba[(i, j)];
+                self.condensed_hessian[(j, 6 + i)] = -ba[(i, j)];
+            }
+        }
+        // Symmetric to the last bit: the end blocks were products of three matrices.
+        for i in 0..12 {
+            for j in 0..i {
+                let mean = 0.5 * (self.condensed_hessian[(i, j)] + self.condensed_hessian[(j, i)]);
+                self.condensed_hessian[(i, j)] = mean;
+                self.condensed_hessian[(j, i)] = mean;
+            }
+        }
+        (&self.condensed_gradient, &self.condensed_hessian)
+    }
+
+    /// Gradient of the last [`Self::condense`].
+    pub fn condensed_gradient(&self) -> &SVector<f64, 12> {
+        &self.condensed_gradient
+    }
+
+    /// Hessian of the last [`Self::condense`].
+    pub fn condensed_hessian(&self) -> &SMatrix<f64, 12, 12> {
+        &self.condensed_hessian
+    }
+
+    /// L⁻¹ of the coupling to link B: its forward solve begins eight rows before the end.
+    fn forward_b(&mut self, b: &SMatrix<f64, END_COUPLING, 6>) {
+        let n = self.factors.order();
+        let mut tail = [[0.0; 6]; END_COUPLING];
+        for (i, row) in tail.iter_mut().enumerate() {
+            *row = std::array::from_fn(|c| b[(i, c)]);
+        }
+        self.factors.forward_tail(&mut tail, n - END_COUPLING);
+        self.reduced_b = tail;
+    }
+
+    /// Internal increment −K⁻¹(g_int + C d) of the links' increment `d`, ordered θ₁, x₂, θ₂, …; for
+    /// [`Rod::retract`](super::Rod::retract). Call after [`Self::condense`].
+    pub fn back_substitute(&mut self, d_link: &SVector<f64, 12>) -> &[f64] {
+        let n = self.factors.order();
+        for (x, y) in self.solution.iter_mut().zip(&self.reduced) {
+            let mut sum = y[6];
+            for c in 0..6 {
+                sum += y[c] * d_link[c];
+            }
+            x[0] = -sum;
+        }
+        for (x, y) in self.solution[n - END_COUPLING..n].iter_mut().zip(&self.reduced_b) {
+            for c in 0..6 {
+                x[0] -= y[c] * d_link[6 + c];
+            }
+        }
+        self.factors.backward(&mut self.solution);
+        for (to, from) in self.increment.iter_mut().zip(&self.solution) {
+            *to = from[0];
+        }
+        &self.increment
+    }
+}
