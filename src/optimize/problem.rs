@@ -104,7 +104,7 @@ impl<'d> Problem<'d> {
     pub fn simulate(&self, x: &[f64]) -> Option<Trial<'d>> {
         self.simulations.fetch_add(1, Ordering::Relaxed);
         let p = self.to_parameters(x);
-        let model = Model::new(self.design, self.layout, &p, self.edges).ok()?;
+        let model = Model::new(self.design, self.layout, &p, self.edges, true).ok()?;
         let cycle = sweep(&model).ok()?;
         let mut terms: Vec<f64> = self
             .objectives

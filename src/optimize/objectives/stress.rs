@@ -1,0 +1,1 @@
+//! Bound on von Mises stress.
