@@ -1,0 +1,183 @@
+//! What grows together or comes too near: overlaps of bodies in the rest pose, where they would be
+//! printed as one, and the least gap over the states of a cycle.
+
+use super::distance::separation;
+use super::link::{BodyPlan, Role};
+use super::parts::PartsInput;
+use super::slot::Slot;
+use crate::math::Pose;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// Part of a flexure's length next to either end that may lie in its own link.
+const ROOT_MM: f64 = 2.5;
+
+/// One side of an overlap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Member {
+    /// Index of a body.
+    Body(usize),
+    /// Index of a flexure.
+    Flexure(usize),
+}
+
+/// Two things that overlap in the rest pose or keep less than the clearance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fusion {
+    /// First.
+    pub a: Member,
+    /// Second.
+    pub b: Member,
+    /// They are printed in one piece: what touches is fused.
+    pub same_part: bool,
+    /// Depth of the overlap, mm; negative: the gap that is less than the process's clearance.
+    pub depth_mm: f64,
+    /// Where.
+    pub at: Vector3<f64>,
+}
+
+/// The worst overlap of each pair in the rest pose. Flexures of one joint are not compared with each
+/// other: their sub-layers keep them apart by the design's own gap.
+pub fn fusions(input: &PartsInput, plans: &[BodyPlan], groups: &[Vec<usize>]) -> Vec<Fusion> {
+    let group_of = |body: usize| groups.iter().position(|g| g.contains(&body));
+    let mut found = Vec::new();
+    for (i, plan_i) in plans.iter().enumerate() {
+        for (j, plan_j) in plans.iter().enumerate().skip(i + 1) {
+            let slots = |p: &BodyPlan| p.slots.iter().map(|(_, s)| *s).collect::<Vec<_>>();
+            if let Some(s) = worst(&slots(plan_i), &slots(plan_j), input.clearance_mm) {
+                let same_part = group_of(i) == group_of(j);
+                found.push(Fusion {
+                    a: Member::Body(i),
+                    b: Member::Body(j),
+                    same_part,
+                    depth_mm: -s.0,
+                    at: s.1,
+                });
+            }
+        }
+    }
+    for (f, flexure) in input.flexures.iter().enumerate() {
+        let whole = flexure.slots();
+        // Of its own bodies a flexure may touch its stubs, and anything near its ends.
+        let (first, last) = (flexure.end_point(false), flexure.end_point(true));
+        let clear_of_ends = |s: &Slot| {
+            (s.start - first).norm().min((s.end - first).norm()) > ROOT_MM
+                && (s.start - last).norm().min((s.end - last).norm()) > ROOT_MM
+        };
+        let inner: Vec<Slot> = whole.iter().filter(|s| clear_of_ends(s)).copied().collect();
+        for (i, plan) in plans.iter().enumerate() {
+            let attached = i == flexure.bodies.0 || i == flexure.bodies.1;
+            let own_stub = |role: &Role| attached && *role == Role::Stub(f);
+            let slots: Vec<Slot> = plan.slots.iter().filter(|(r, _)| !own_stub(r)).map(|(_, s)| *s).collect();
+            if let Some(s) = worst(&slots, if attached { &inner } else { &whole }, input.clearance_mm) {
+                let same_part = group_of(i) == group_of(flexure.bodies.0);
+                found.push(Fusion {
+                    a: Member::Body(i),
+                    b: Member::Flexure(f),
+                    same_part,
+                    depth_mm: -s.0,
+                    at: s.1,
+                });
+            }
+        }
+        for (g, other) in
+            input.flexures.iter().enumerate().skip(f + 1).filter(|(_, o)| o.joint != flexure.joint)
+        {
+            if let Some(s) = worst(&whole, &other.slots(), input.clearance_mm) {
+                let same_part = group_of(flexure.bodies.0) == group_of(other.bodies.0);
+                found.push(Fusion {
+                    a: Member::Flexure(f),
+                    b: Member::Flexure(g),
+                    same_part,
+                    depth_mm: -s.0,
+                    at: s.1,
+                });
+            }
+        }
+    }
+    found
+}
+
+/// Least gap below a bound, and its place; `None` if all stay farther apart.
+fn worst(a: &[Slot], b: &[Slot], bound_mm: f64) -> Option<(f64, Vector3<f64>)> {
+    // Rounding of two faces that are exactly the clearance apart is no finding.
+    let mut best = (bound_mm * (1.0 - 1e-6) - 1e-6, None);
+    for p in a {
+        let (cp, rp) = p.bounding_sphere();
+        for q in b {
+            let (cq, rq) = q.bounding_sphere();
+            if (cp - cq).norm() - rp - rq < best.0 {
+                let s = separation(p, q);
+                if s.gap_mm < best.0 {
+                    best = (s.gap_mm, Some(s.at));
+                }
+            }
+        }
+    }
+    best.1.map(|at| (best.0, at))
+}
+
+/// Least gap between two bodies at one state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LeastGap {
+    /// State (index into the poses).
+    pub state: usize,
+    /// Bodies.
+    pub bodies: (usize, usize),
+    /// Gap, mm; negative when they overlap.
+    pub gap_mm: f64,
+    /// Where, in the pose of that state.
+    pub at: Vector3<f64>,
+}
+
+/// Least gap of each state over all pairs of bodies but the `skipped` ones (in any order; the eyes
+/// of a conventional joint that both bodies share are left out by themselves, as they turn in each
+/// other's slots by construction). `poses[state][body]`; a state of the wrong size gives `None`,
+/// as does one with no pair to compare.
+pub fn least_gap(
+    plans: &[BodyPlan],
+    poses: &[Vec<Pose>],
+    skipped: &[(usize, usize)],
+) -> Vec<Option<LeastGap>> {
+    let skip = |i: usize, j: usize| skipped.contains(&(i, j)) || skipped.contains(&(j, i));
+    poses
+        .par_iter()
+        .enumerate()
+        .map(|(state, pose)| {
+            if pose.len() != plans.len() {
+                return None;
+            }
+            let moved: Vec<Vec<(Role, Slot)>> = plans
+                .iter()
+                .zip(pose)
+                .map(|(plan, pose)| plan.slots.iter().map(|(r, s)| (*r, s.moved(pose))).collect())
+                .collect();
+            let mut best: Option<LeastGap> = None;
+            for i in 0..moved.len() {
+                for j in (i + 1)..moved.len() {
+                    if skip(i, j) {
+                        continue;
+                    }
+                    for (role_p, p) in &moved[i] {
+                        let (cp, rp) = p.bounding_sphere();
+                        for (role_q, q) in &moved[j] {
+                            if matches!((role_p, role_q), (Role::Eye(a), Role::Eye(b)) if a == b) {
+                                continue;
+                            }
+                            let (cq, rq) = q.bounding_sphere();
+                            let bound = best.map_or(f64::INFINITY, |b| b.gap_mm);
+                            if (cp - cq).norm() - rp - rq >= bound {
+                                continue;
+                            }
+                            let s = separation(p, q);
+                            if s.gap_mm < bound {
+                                best = Some(LeastGap { state, bodies: (i, j), gap_mm: s.gap_mm, at: s.at });
+                            }
+                        }
+                    }
+                }
+            }
+            best
+        })
+        .collect()
+}

@@ -1,0 +1,401 @@
+//! A body's link: from skeleton points, stubs and eyes to a list of slots (physics.md "Geometry",
+//! language.md "Layers").
+//!
+//! Sizes are nested on purpose: a boss is wider and higher than the bars that end in it, an eye than
+//! its neck, so that no two faces coincide and the boolean kernel meets only clear crossings. What
+//! is left (bars side by side under one boss) is kept apart by a small spread of heights.
+
+use super::mesh::Mesh;
+use super::parts::{Bore, Eye, FLOOR_MM, GeometryError, PartsInput};
+use super::skeleton::connect;
+use super::slot::{Facets, Slot};
+use nalgebra::Vector3;
+
+/// Half width of a bar as a part of the layer's height.
+const BAR_PER_HEIGHT: f64 = 0.35;
+/// Radius of a boss or plain eye beyond the bar's half width, mm.
+const BOSS_EXTRA_MM: f64 = 0.4;
+/// How far the top of a boss stays below its layer's face, mm.
+const BOSS_BELOW_MM: f64 = 0.02;
+/// How far the top of a bar stays below its layer's face, mm.
+const BAR_BELOW_MM: f64 = 0.25;
+/// Largest spread of heights and widths that keeps like faces apart, mm.
+const SPREAD_MM: f64 = 0.08;
+/// Half width of a stub, mm; more where a thick flexure needs it.
+const STUB_RADIUS_MM: f64 = 2.2;
+/// Length of a stub in front of its boss, mm.
+const STUB_FREE_MM: f64 = 3.0;
+/// How far a stub reaches over the attachment plane, mm: its round nose then holds the whole
+/// thickness of a flexure at that plane on average.
+const STUB_OVER_MM: f64 = 0.05;
+/// How far a stub stays below the rim of a flexure that fills its sub-layer, mm.
+const STUB_BELOW_MM: f64 = 0.06;
+/// Rounding of edges, mm.
+const ROUND_MM: f64 = 0.8;
+/// Rounding of a stub's edges, mm: small, so that the flexure's clamp is as wide as the flexure.
+const STUB_ROUND_MM: f64 = 0.5;
+/// Wall round a bore, mm; the process's least wall if that is more.
+const BORE_WALL_MM: f64 = 2.0;
+/// Points nearer than this in plan are one node, mm.
+const SAME_NODE_MM: f64 = 1.0;
+
+/// What a slot of a body is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Receives an end of the flexure with this index.
+    Stub(usize),
+    /// Joins bars at a node.
+    Boss,
+    /// Joins two nodes.
+    Bar,
+    /// A body's share of the conventional joint with this index.
+    Eye(usize),
+    /// Joins layers.
+    Riser,
+}
+
+/// A cylinder to be taken out of a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoreCut {
+    /// Joint it belongs to.
+    pub joint: usize,
+    /// Lower end.
+    pub start: Vector3<f64>,
+    /// Upper end.
+    pub end: Vector3<f64>,
+    /// Diameter of the hole between opposite facets, mm.
+    pub diameter_mm: f64,
+}
+
+/// A body as primitives in the rest pose.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BodyPlan {
+    /// What is united.
+    pub slots: Vec<(Role, Slot)>,
+    /// What is then cut out.
+    pub bores: Vec<BoreCut>,
+    /// What the maker should know.
+    pub notes: Vec<String>,
+}
+
+impl BodyPlan {
+    /// One closed mesh a slot.
+    pub fn meshes(&self, facets: &Facets) -> Vec<Mesh> {
+        self.slots.iter().enumerate().map(|(i, (_, s))| s.mesh(facets, spread(i))).collect()
+    }
+
+    /// One closed mesh a bore. Its facets touch the stated circle from outside, so that a pin of
+    /// that diameter passes.
+    pub fn bore_meshes(&self, facets: &Facets) -> Vec<Mesh> {
+        self.bores
+            .iter()
+            .enumerate()
+            .map(|(i, b)| {
+                let n = ((facets.around / 4).max(2) * 4) as f64;
+                let radius = b.diameter_mm / 2.0 / (std::f64::consts::PI / n).cos();
+                let axis = (b.end - b.start).try_normalize(0.0).unwrap_or_else(Vector3::z);
+                let (middle, half) = ((b.start + b.end) / 2.0, (b.end - b.start).norm() / 2.0);
+                let slot = Slot {
+                    start: middle,
+                    end: middle,
+                    axis,
+                    disc_radius_mm: radius,
+                    half_height_mm: half,
+                    round_mm: 0.0,
+                };
+                slot.mesh(facets, spread(i + 100) + 0.5)
+            })
+            .collect()
+    }
+}
+
+/// Spread in 0..1 by the golden ratio: any two small indices get clearly different values.
+fn spread(i: usize) -> f64 {
+    (i as f64 * 0.618_033_988_749_894_9 + 0.137).fract()
+}
+
+/// A place in plan where something of the body ends.
+struct Node {
+    /// At the body's own level.
+    at: Vector3<f64>,
+    /// Eye in the body's own layer, if any: bars then end in necks at its slot's height.
+    own_eye: Option<EyeShape>,
+}
+
+/// Measures of an eye.
+#[derive(Clone, Copy)]
+struct EyeShape {
+    center: Vector3<f64>,
+    radius: f64,
+    half_height: f64,
+    /// Radius to be kept free for the other bodies at this joint.
+    keep_out: f64,
+}
+
+/// Shared state while one body is planned.
+struct Builder<'a> {
+    input: &'a PartsInput,
+    plan: BodyPlan,
+    nodes: Vec<Node>,
+    level: f64,
+}
+
+/// Plans one body.
+pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, GeometryError> {
+    let Some(body) = input.bodies.get(index) else {
+        return Err(GeometryError::Input(format!("there is no body {index}")));
+    };
+    let mut b = Builder { input, plan: BodyPlan::default(), nodes: Vec::new(), level: body.level_mm };
+    for eye in &body.eyes {
+        b.add_eye(eye, &body.name);
+    }
+    for (f, flexure) in input.flexures.iter().enumerate() {
+        for (at_end, at_body) in [(false, flexure.bodies.0), (true, flexure.bodies.1)] {
+            if at_body == index {
+                b.add_stub(f, at_end)?;
+            }
+        }
+    }
+    for p in &body.skeleton {
+        b.node(*p, None);
+    }
+    if b.nodes.is_empty() {
+        return Err(GeometryError::NoSkeleton(body.name.clone()));
+    }
+    b.connect(&body.name);
+    Ok(b.plan)
+}
+
+impl Builder<'_> {
+    fn axis(&self) -> Vector3<f64> {
+        self.input.axis
+    }
+
+    fn half(&self) -> f64 {
+        self.input.height_mm / 2.0
+    }
+
+    fn bar_radius(&self) -> f64 {
+        self.input.height_mm * BAR_PER_HEIGHT
+    }
+
+    fn boss_radius(&self) -> f64 {
+        self.bar_radius() + BOSS_EXTRA_MM
+    }
+
+    /// A point moved along the axis to a level.
+    fn at_level(&self, p: &Vector3<f64>, level: f64) -> Vector3<f64> {
+        p + self.axis() * (level - p.dot(&self.axis()))
+    }
+
+    fn push(&mut self, role: Role, slot: Slot) {
+        self.plan.slots.push((role, slot));
+    }
+
+    /// The node at a place in plan, made if there is none.
+    fn node(&mut self, p: Vector3<f64>, own_eye: Option<EyeShape>) -> usize {
+        let at = self.at_level(&p, self.level);
+        if let Some(i) = self.nodes.iter().position(|n| (n.at - at).norm() < SAME_NODE_MM) {
+            if self.nodes[i].own_eye.is_none() {
+                self.nodes[i].own_eye = own_eye;
+            }
+            return i;
+        }
+        self.nodes.push(Node { at, own_eye });
+        self.nodes.len() - 1
+    }
+
+    /// Measures of an eye: its share of the joint's layer, and the radius all of them need.
+    fn eye_shape(&self, eye: &Eye) -> EyeShape {
+        let (k, n) = (eye.slot.0 as f64, eye.slot.1 as f64);
+        let c = self.input.clearance_mm;
+        let share = (self.input.height_mm - (n - 1.0) * c) / n;
+        let middle = -self.half() + share / 2.0 + k * (share + c);
+        let wall = BORE_WALL_MM.max(self.input.least_wall_mm);
+        let radius_of =
+            |bore: &Bore| self.boss_radius().max(bore.diameter_mm().map_or(0.0, |d| d / 2.0 + wall));
+        let others = self.input.bodies.iter().flat_map(|b| &b.eyes).filter(|e| e.joint == eye.joint);
+        EyeShape {
+            center: eye.point + self.axis() * middle,
+            radius: radius_of(&eye.bore),
+            half_height: share / 2.0,
+            keep_out: others.map(|e| radius_of(&e.bore)).fold(0.0, f64::max) + c,
+        }
+    }
+
+    fn add_eye(&mut self, eye: &Eye, name: &str) {
+        let shape = self.eye_shape(eye);
+        let axis = self.axis();
+        let slot = Slot::bar(
+            shape.center,
+            shape.center,
+            axis,
+            shape.radius,
+            shape.half_height - BOSS_BELOW_MM,
+            ROUND_MM,
+        );
+        self.push(Role::Eye(eye.joint), slot);
+        let joint_level = eye.point.dot(&axis);
+        if (joint_level - self.level).abs() < 0.5 * self.input.height_mm {
+            self.node(eye.point, Some(shape));
+        } else {
+            let foot = self.at_level(&eye.point, self.level);
+            self.riser(foot, shape.center, shape.radius - BOSS_EXTRA_MM);
+            // The boss at the foot is as wide as the eye: a bore may pass through it.
+            self.boss(foot, shape.radius);
+            self.node(eye.point, None);
+        }
+        self.bore(eye, &shape, name);
+    }
+
+    fn bore(&mut self, eye: &Eye, shape: &EyeShape, name: &str) {
+        let axis = self.axis();
+        let c = self.input.clearance_mm;
+        match eye.bore {
+            Bore::Solid => self.plan.notes.push(format!(
+                "`{name}`: no pin diameter is stated for the joint at ({:.1}, {:.1}) mm, so its eye has no hole.",
+                eye.point.x, eye.point.y
+            )),
+            Bore::Blind { diameter_mm } => {
+                // To the middle of the clearance where another eye follows, else to the floor.
+                let reach = shape.half_height + c / 2.0;
+                let middle = (shape.center - eye.point).dot(&axis);
+                let low = if eye.slot.0 == 0 { FLOOR_MM - self.half() } else { middle - reach };
+                let high = if eye.slot.0 + 1 == eye.slot.1 { self.half() - FLOOR_MM } else { middle + reach };
+                let (start, end) = (eye.point + axis * low, eye.point + axis * high);
+                self.plan.bores.push(BoreCut { joint: eye.joint, start, end, diameter_mm });
+                if eye.slot.0 == 0 {
+                    let length = self.input.height_mm - 2.0 * FLOOR_MM - c;
+                    self.plan.notes.push(format!(
+                        "`{name}`: the pin at ({:.1}, {:.1}) mm drops into a hole of {diameter_mm:.2} mm; cut it {length:.1} mm long.",
+                        eye.point.x, eye.point.y
+                    ));
+                }
+            }
+            Bore::Through { diameter_mm } => {
+                let joint_level = eye.point.dot(&axis);
+                let reach = (joint_level - self.level).abs() + self.input.height_mm;
+                let (start, end) = (eye.point - axis * reach, eye.point + axis * reach);
+                self.plan.bores.push(BoreCut { joint: eye.joint, start, end, diameter_mm });
+            }
+        }
+    }
+
+    fn add_stub(&mut self, index: usize, at_end: bool) -> Result<(), GeometryError> {
+        let Some(flexure) = self.input.flexures.get(index) else { return Ok(()) };
+        let axis = self.axis();
+        let p = flexure.end_point(at_end);
+        let outward = flexure.outward(at_end);
+        let flat = outward - axis * outward.dot(&axis);
+        let Some(flat) = flat.try_normalize(0.2) else {
+            return Err(GeometryError::Input(format!(
+                "`{}` leaves its link along the stacking axis",
+                flexure.path
+            )));
+        };
+        let (a, b) = flexure.end_axes(at_end);
+        let wall = self.input.least_wall_mm;
+        let radius = STUB_RADIUS_MM.max(a + wall);
+        // Room along the axis: the layer's faces, and the rims of other flexures of this joint.
+        let middle = p.dot(&axis);
+        let level = flexure.joint_point.dot(&axis);
+        let (mut low, mut high) = (middle - b - wall, middle + b + wall);
+        low = low.max(level - self.half()).min(middle - b);
+        high = high.min(level + self.half()).max(middle + b);
+        for other in self.input.flexures.iter().filter(|f| f.joint == flexure.joint && f.path != flexure.path)
+        {
+            let z = other.centreline.first().map_or(middle, |q| q.dot(&axis));
+            if z < middle - 1e-6 {
+                low = middle - b;
+            } else if z > middle + 1e-6 {
+                high = middle + b;
+            }
+        }
+        let half_height =
+            (high - low) / 2.0 - STUB_BELOW_MM - 0.5 * SPREAD_MM * spread(2 * index + usize::from(at_end));
+        let center = self.at_level(&p, (low + high) / 2.0);
+        let nose = center + flat * (radius - STUB_OVER_MM);
+        let root = center + flat * (STUB_FREE_MM + self.boss_radius());
+        self.push(
+            Role::Stub(index),
+            Slot::bar(nose, root, axis, radius, half_height.max(0.1), STUB_ROUND_MM),
+        );
+        let top = self.at_level(&root, level);
+        self.boss(top, self.boss_radius());
+        let foot = self.at_level(&root, self.level);
+        if (level - self.level).abs() >= 0.5 * self.input.height_mm {
+            self.riser(foot, top, self.bar_radius());
+            self.boss(foot, self.boss_radius());
+        }
+        self.node(root, None);
+        Ok(())
+    }
+
+    /// A full-height disc, unless one stands there already.
+    fn boss(&mut self, at: Vector3<f64>, radius: f64) {
+        let taken = self.plan.slots.iter().any(|(role, s)| {
+            *role == Role::Boss && (s.start - at).norm() < 1e-6 && s.radius_mm() >= radius - SPREAD_MM
+        });
+        if !taken {
+            let i = self.plan.slots.len();
+            let half = self.half() - BOSS_BELOW_MM - SPREAD_MM * spread(i);
+            self.push(Role::Boss, Slot::bar(at, at, self.axis(), radius, half, ROUND_MM));
+        }
+    }
+
+    fn riser(&mut self, from: Vector3<f64>, to: Vector3<f64>, radius: f64) {
+        let half = (to - from).norm() / 2.0;
+        let middle = (from + to) / 2.0;
+        self.push(Role::Riser, Slot::bar(middle, middle, self.axis(), radius - 0.1, half, ROUND_MM));
+    }
+
+    /// Bars between the nodes, in the body's own layer.
+    fn connect(&mut self, name: &str) {
+        for i in 0..self.nodes.len() {
+            let (at, is_eye) = (self.nodes[i].at, self.nodes[i].own_eye.is_some());
+            if !is_eye {
+                self.boss(at, self.boss_radius());
+            }
+        }
+        let points: Vec<Vector3<f64>> = self.nodes.iter().map(|n| n.at).collect();
+        let net = connect(&points);
+        if let Some(hub) = net.hub {
+            self.boss(hub, self.boss_radius());
+            self.nodes.push(Node { at: hub, own_eye: None });
+        }
+        for (i, j) in net.edges {
+            self.bar(i, j, name);
+        }
+    }
+
+    fn bar(&mut self, i: usize, j: usize, name: &str) {
+        let axis = self.axis();
+        let index = self.plan.slots.len();
+        let radius = self.bar_radius() - SPREAD_MM * spread(index);
+        let half = self.half() - BAR_BELOW_MM - SPREAD_MM * spread(index);
+        let (p, q) = (self.nodes[i].at, self.nodes[j].at);
+        let length = (q - p).norm();
+        let Some(along) = (q - p).try_normalize(1e-9) else { return };
+        let eyes = (self.nodes[i].own_eye, self.nodes[j].own_eye);
+        // The nose of the full-height piece stops short of the other bodies' eyes.
+        let trim = |eye: &Option<EyeShape>| eye.map_or(0.0, |e| e.keep_out + radius);
+        let (from, to) = (trim(&eyes.0), length - trim(&eyes.1));
+        if eyes.0.is_none() && eyes.1.is_none() {
+            self.push(Role::Bar, Slot::bar(p, q, axis, radius, half, ROUND_MM));
+            return;
+        }
+        if to - from < 0.0 {
+            self.plan.notes.push(format!("`{name}`: two eyes stand too close for a bar between them."));
+        }
+        let (from, to) = (from.min(to).max(0.0), to.max(from.min(to)));
+        let (start, end) = (p + along * from, p + along * to);
+        let middle = (start + end) / 2.0;
+        self.push(Role::Bar, Slot::bar(start, end, axis, radius, half, ROUND_MM));
+        for eye in [eyes.0, eyes.1].into_iter().flatten() {
+            let level = eye.center.dot(&axis);
+            let neck = eye.half_height - BAR_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len());
+            let inner = self.at_level(&middle, level);
+            self.push(Role::Bar, Slot::bar(eye.center, inner, axis, radius - 0.3, neck.max(0.1), ROUND_MM));
+        }
+    }
+}

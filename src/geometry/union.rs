@@ -1,0 +1,84 @@
+//! The one client of the boolean kernel (boolmesh): unions and differences of closed meshes.
+//!
+//! The kernel is asked only for clear crossings: who builds the operands keeps coplanar and tangent
+//! faces out. A panic inside it becomes an error here, because its code cannot be vouched for.
+
+use super::mesh::Mesh;
+use boolmesh::prelude::{Manifold, OpType, compute_boolean};
+use nalgebra::Vector3;
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Why a solid could not be made.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BooleanError {
+    /// The kernel refused an operand or a result.
+    Kernel(String),
+    /// The kernel panicked.
+    Panic,
+    /// Nothing to unite.
+    Empty,
+}
+
+impl fmt::Display for BooleanError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            BooleanError::Kernel(text) => write!(f, "the boolean kernel failed: {text}"),
+            BooleanError::Panic => write!(f, "the boolean kernel broke down"),
+            BooleanError::Empty => write!(f, "there is nothing to unite"),
+        }
+    }
+}
+
+impl std::error::Error for BooleanError {}
+
+/// Union of all meshes, pairwise as a balanced tree: the same tree on any number of threads.
+pub fn union_all(meshes: &[Mesh]) -> Result<Mesh, BooleanError> {
+    Ok(from_kernel(&union_tree(meshes)?))
+}
+
+/// `solid` without `tools`, one after the other.
+pub fn subtract_all(solid: &Mesh, tools: &[Mesh]) -> Result<Mesh, BooleanError> {
+    let mut left = to_kernel(solid)?;
+    for tool in tools {
+        left = boolean(&left, &to_kernel(tool)?, OpType::Subtract)?;
+    }
+    Ok(from_kernel(&left))
+}
+
+fn union_tree(meshes: &[Mesh]) -> Result<Manifold, BooleanError> {
+    match meshes {
+        [] => Err(BooleanError::Empty),
+        [one] => to_kernel(one),
+        _ => {
+            let (left, right) = meshes.split_at(meshes.len() / 2);
+            let (a, b) = rayon::join(|| union_tree(left), || union_tree(right));
+            boolean(&a?, &b?, OpType::Add)
+        }
+    }
+}
+
+fn boolean(a: &Manifold, b: &Manifold, op: OpType) -> Result<Manifold, BooleanError> {
+    catch_unwind(AssertUnwindSafe(|| compute_boolean(a, b, op)))
+        .map_err(|_| BooleanError::Panic)?
+        .map_err(BooleanError::Kernel)
+}
+
+fn to_kernel(mesh: &Mesh) -> Result<Manifold, BooleanError> {
+    let positions: Vec<f64> = mesh.vertices.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
+    let indices: Vec<usize> = mesh.triangles.iter().flatten().copied().collect();
+    catch_unwind(AssertUnwindSafe(|| Manifold::new(&positions, &indices)))
+        .map_err(|_| BooleanError::Panic)?
+        .map_err(BooleanError::Kernel)
+}
+
+fn from_kernel(solid: &Manifold) -> Mesh {
+    let vertices = solid.ps.iter().map(|p| Vector3::new(p.x, p.y, p.z)).collect();
+    let triangles = solid
+        .hs
+        .chunks_exact(3)
+        .filter(|t| t.iter().all(|h| h.tail < solid.ps.len()))
+        .map(|t| [t[0].tail, t[1].tail, t[2].tail])
+        .collect();
+    Mesh { vertices, triangles }
+}
