@@ -1,1 +1,5 @@
-//! (being written)
+//! Exporters, one file (or folder) each: plain results in, bytes out.
+
+pub mod arduino;
+pub mod csv;
+pub mod lock;
