@@ -6,8 +6,8 @@ use serde::Serialize;
 use std::f64::consts::TAU;
 use std::fmt;
 
-/// Least time between two step pulses, µs. `digitalWrite` and `micros` on a 16 MHz AVR need about 30 µs a
-/// pulse altogether (measured in simavr: 10 turns at 50 µs a pulse lose nothing).
+/// Least time between two step pulses, µs. On a simulated 16 MHz Uno ten turns at this rate lose no pulse
+/// and gather no delay (`tests/firmware.rs`).
 pub const LEAST_PULSE_GAP_US: u32 = 50;
 /// Longest cycle, µs: differences of the 32-bit microsecond clock must stay below half its range.
 pub const LONGEST_CYCLE_US: u32 = 1_800_000_000;
@@ -97,10 +97,17 @@ impl fmt::Display for SketchError {
             Self::States { states } => {
                 write!(f, "a cycle of {states} steps does not fit a sketch, which takes 1 to {MOST_STATES}")
             }
-            Self::Position { state } => write!(f, "the motor's position at state {state} is more than {FARTHEST_PULSES} microsteps away"),
+            Self::Position { state } => write!(
+                f,
+                "the motor's position at state {state} is more than {FARTHEST_PULSES} microsteps away"
+            ),
             Self::NotClosed => write!(f, "first and last state are not whole turns apart"),
             Self::Duration { duration_s } => {
-                write!(f, "a cycle of {duration_s} s is not between 1 ms and {} s", LONGEST_CYCLE_US / 1_000_000)
+                write!(
+                    f,
+                    "a cycle of {duration_s} s is not between 1 ms and {} s",
+                    LONGEST_CYCLE_US / 1_000_000
+                )
             }
             Self::TooFast { state, least_duration_s } => write!(
                 f,
@@ -176,7 +183,8 @@ impl Sketch {
         if !fits(self.steps_per_turn) || !fits(self.microsteps) {
             return Err(SketchError::Resolution);
         }
-        let pulses_per_turn = self.steps_per_turn.checked_mul(self.microsteps).ok_or(SketchError::Resolution)?;
+        let pulses_per_turn =
+            self.steps_per_turn.checked_mul(self.microsteps).ok_or(SketchError::Resolution)?;
         let states = self.angles_rad.len().saturating_sub(1);
         if states == 0 || states > MOST_STATES {
             return Err(SketchError::States { states });
@@ -313,7 +321,11 @@ struct Context {
 /// Rounds to a whole number of microsteps.
 fn whole(pulses: f64, state: usize) -> Result<i32, SketchError> {
     let rounded = pulses.round();
-    if rounded.abs() <= f64::from(FARTHEST_PULSES) { Ok(rounded as i32) } else { Err(SketchError::Position { state }) }
+    if rounded.abs() <= f64::from(FARTHEST_PULSES) {
+        Ok(rounded as i32)
+    } else {
+        Err(SketchError::Position { state })
+    }
 }
 
 /// Text that cannot end a `//` comment or join it with the next line, whatever the user wrote.

@@ -44,7 +44,10 @@ fn starts_where_the_part_rests() {
 fn names_cannot_leave_their_comment() {
     let nasty = Sketch { mechanism: "a\nint x; \\".into(), drive: "é*/ \"b\" ??/".into(), ..crank() };
     let text = nasty.render().unwrap();
-    assert_eq!(text.lines().next(), Some("// a_int x_ _: drives \"___ _b_ ___\" with a stepper motor behind a step/direction driver"));
+    assert_eq!(
+        text.lines().next(),
+        Some("// a_int x_ _: drives \"___ _b_ ___\" with a stepper motor behind a step/direction driver")
+    );
     assert!(nasty.name().chars().all(|c| c.is_ascii_alphanumeric() || c == '_'));
     assert_eq!(text.lines().count(), crank().render().unwrap().lines().count());
 }
@@ -58,7 +61,10 @@ fn says_why_there_is_no_sketch() {
         error(Sketch { angles_rad: vec![0.0; MOST_STATES + 2], ..crank() }),
         SketchError::States { states: MOST_STATES + 1 }
     );
-    assert_eq!(error(Sketch { angles_rad: vec![0.0, f64::NAN], ..crank() }), SketchError::Position { state: 1 });
+    assert_eq!(
+        error(Sketch { angles_rad: vec![0.0, f64::NAN], ..crank() }),
+        SketchError::Position { state: 1 }
+    );
     assert_eq!(error(Sketch { angles_rad: vec![0.0, 1.0], ..crank() }), SketchError::NotClosed);
     assert_eq!(error(Sketch { duration_s: f64::NAN, ..crank() }).to_string().contains("NaN"), true);
     assert!(matches!(error(Sketch { duration_s: 1e9, ..crank() }), SketchError::Duration { .. }));

@@ -55,13 +55,7 @@ impl Lock {
     /// The lock of a design and its solution.
     pub fn new(design: &Design, solution: Solution) -> Self {
         let units = design.free.iter().map(|v| (v.path.clone(), v.unit.clone())).collect();
-        Self {
-            design: design_digest(design),
-            solver: SOLVER_VERSION.into(),
-            solution,
-            units,
-            intact: true,
-        }
+        Self { design: design_digest(design), solver: SOLVER_VERSION.into(), solution, units, intact: true }
     }
 
     /// What this lock is worth for a design.
@@ -244,7 +238,11 @@ impl Parser<'_> {
         self.once(key, at);
         match key {
             "design" | "values" if !is_digest(value) => {
-                self.fail("E0703", format!("`{key}` needs a digest, `sha256:` and 64 hexadecimal digits"), at);
+                self.fail(
+                    "E0703",
+                    format!("`{key}` needs a digest, `sha256:` and 64 hexadecimal digits"),
+                    at,
+                );
             }
             "design" => self.lock.design = value.into(),
             "values" => *written_digest = Some(value.into()),
