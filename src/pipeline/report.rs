@@ -1,0 +1,138 @@
+//! What a build tells: the numbers before and after, what was required, what was made, how long it took.
+
+use crate::diagnostic::{Diagnostic, SourceMap};
+use crate::ir::{Design, Solution};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The mechanism's measures over the cycle.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Measures {
+    /// By trace.
+    pub traces: BTreeMap<String, TraceMeasures>,
+    /// By drive.
+    pub drives: BTreeMap<String, DriveMeasures>,
+    /// Of all rods.
+    pub stress: StressMeasures,
+    /// Between bodies.
+    pub gap: GapMeasures,
+}
+
+/// A trace against its target.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct TraceMeasures {
+    /// Mean distance (a closed cycle's last state counts once), mm.
+    pub mean_error_mm: f64,
+    /// Largest distance, mm.
+    pub max_error_mm: f64,
+    /// Length of the traced path, mm.
+    pub path_length_mm: f64,
+}
+
+/// A drive's load.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct DriveMeasures {
+    /// Largest size of the torque, N·mm.
+    pub max_torque_n_mm: f64,
+}
+
+/// Stress over the cycle.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct StressMeasures {
+    /// True largest von Mises stress, MPa; none without rods.
+    pub max_mpa: Option<f64>,
+}
+
+/// Distance of bodies over the cycle.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct GapMeasures {
+    /// Least distance, mm; none where not asked for.
+    pub least_mm: Option<f64>,
+}
+
+/// Wall-clock time a stage, s.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Seconds {
+    /// The whole build.
+    pub total: f64,
+    /// Reading, elaboration, the conventional motion.
+    pub check: f64,
+    /// Optimisation and simulation.
+    pub solve: f64,
+    /// Solids.
+    pub mesh: f64,
+    /// Artefacts as bytes.
+    pub emit: f64,
+}
+
+/// A `require` line and what was measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RequirementResult {
+    /// The line as written.
+    pub text: String,
+    /// Measured value; none if it could not be measured.
+    pub value: Option<f64>,
+    /// Unit of value and bound.
+    pub unit: &'static str,
+    /// The bound.
+    pub bound: f64,
+    /// Whether it holds.
+    pub pass: bool,
+}
+
+/// A file to write: a path relative to the output folder, with `/`, and its content.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Artefact {
+    /// Relative path.
+    pub name: String,
+    /// Content.
+    pub bytes: Vec<u8>,
+}
+
+/// Where the values came from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Origin {
+    /// Nothing was solved.
+    #[default]
+    Nothing,
+    /// Solved from the design's own start.
+    Start,
+    /// Solved, starting from the values of an older lock.
+    OldLock,
+    /// Taken from the lock.
+    Lock,
+}
+
+/// All that a build gives. What could not be reached stays empty; `diagnostics` says why.
+#[derive(Clone, Debug, Default)]
+pub struct BuildOutcome {
+    /// The files read.
+    pub sources: SourceMap,
+    /// Findings of all stages, in their order.
+    pub diagnostics: Vec<Diagnostic>,
+    /// The elaborated design.
+    pub design: Option<Design>,
+    /// The solved values.
+    pub solution: Option<Solution>,
+    /// Where they came from.
+    pub solved_from: Origin,
+    /// Measures at the design's start.
+    pub before: Option<Measures>,
+    /// Measures of the result.
+    pub after: Option<Measures>,
+    /// Acceptance tests.
+    pub requirements: Vec<RequirementResult>,
+    /// Files to write.
+    pub artefacts: Vec<Artefact>,
+    /// Text of the lock, if it is to be written.
+    pub lock: Option<String>,
+    /// Times.
+    pub seconds: Seconds,
+}
+
+impl BuildOutcome {
+    /// Whether the design has errors or a requirement fails.
+    pub fn failed(&self) -> bool {
+        self.diagnostics.iter().any(Diagnostic::is_error) || self.requirements.iter().any(|r| !r.pass)
+    }
+}
