@@ -1,0 +1,274 @@
+//! The only client of pest: text to concrete tree by `grammar/mech.pest`, and the question
+//! "what was expected here" for what a catch-all rule took.
+
+use super::tree::{Kind, Node, fill};
+use pest::Parser;
+use pest::error::{ErrorVariant, InputLocation};
+use pest::iterators::Pair;
+
+#[derive(pest_derive::Parser)]
+#[grammar = "../grammar/mech.pest"]
+struct Mech;
+
+/// Parses a whole file. The grammar accepts every text; `None` would be a fault of the grammar.
+pub(super) fn tree(source: &str) -> Option<Node> {
+    let pair = Mech::parse(Rule::file, source).ok()?.next()?;
+    Some(node(pair, source))
+}
+
+/// What a broken part should have been.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wanted {
+    /// A statement of a mechanism or flexure.
+    Statement,
+    /// A top-level declaration.
+    Item,
+    /// A term of `minimize`.
+    Term,
+    /// `name = value`.
+    Field,
+}
+
+/// Where and why a part could not be read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Failure {
+    /// Byte offset in the file.
+    pub at: usize,
+    /// What could have stood there, in the user's words, most telling first.
+    pub expected: Vec<String>,
+}
+
+/// Parses the part of `source` from `start` as what it should have been.
+/// `None` if it can be read, or starts with something else altogether.
+pub(super) fn why(source: &str, start: usize, wanted: Wanted) -> Option<Failure> {
+    let rule = match wanted {
+        Wanted::Statement => Rule::whole_statement,
+        Wanted::Item => Rule::whole_item,
+        Wanted::Term => Rule::whole_term,
+        Wanted::Field => Rule::whole_field,
+    };
+    let error = Mech::parse(rule, source.get(start..)?).err()?;
+    let offset = match error.location {
+        InputLocation::Pos(at) | InputLocation::Span((at, _)) => at,
+    };
+    let ErrorVariant::ParsingError { positives, .. } = error.variant else {
+        return None;
+    };
+    Some(Failure { at: start + offset, expected: expectations(&positives) })
+}
+
+/// The user's words for the rules that could have stood at a place. What may follow almost
+/// anything (operators, units) is named only if nothing else could stand there.
+fn expectations(rules: &[Rule]) -> Vec<String> {
+    let strong: Vec<Rule> = rules.iter().copied().filter(|r| !is_weak(*r)).collect();
+    let mut named: Vec<(u8, String)> = Vec::new();
+    for rule in if strong.is_empty() { rules } else { &strong } {
+        let word = words(*rule);
+        // The end of the line is the least telling: it comes last.
+        let rank = u8::from(*rule == Rule::line_end);
+        if !named.iter().any(|(_, w)| *w == word) {
+            named.push((rank, word));
+        }
+    }
+    named.sort_by_key(|(rank, _)| *rank);
+    named.into_iter().map(|(_, word)| word).collect()
+}
+
+fn is_weak(rule: Rule) -> bool {
+    matches!(
+        rule,
+        Rule::add_op
+            | Rule::mul_op
+            | Rule::caret
+            | Rule::minus
+            | Rule::unit
+            | Rule::unit_op
+            | Rule::unit_factor
+            | Rule::unit_symbol
+            | Rule::unit_power
+            | Rule::dot
+    )
+}
+
+fn words(rule: Rule) -> String {
+    let text = match rule {
+        Rule::ident | Rule::bodies => "a name",
+        Rule::value | Rule::sum | Rule::product | Rule::unary | Rule::power | Rule::argument => "a value",
+        Rule::free => "`free START in LOWER .. UPPER`",
+        Rule::number | Rule::digits => "a number",
+        Rule::exponent | Rule::integer => "a whole number",
+        Rule::unit | Rule::unit_factor | Rule::unit_symbol => "a unit",
+        Rule::unit_op | Rule::unit_power | Rule::add_op | Rule::mul_op | Rule::minus => "an operator",
+        Rule::call => "a call such as `track(tip)`",
+        Rule::name => "a name",
+        Rule::term => "a term such as `track(tip)`",
+        Rule::field => "`name = value`",
+        Rule::product_name => "a product such as `stl`",
+        Rule::dimension => "a dimension such as `length`",
+        Rule::text => "a file name in quotes",
+        Rule::path => "a path such as `std.materials.rigur`",
+        Rule::compare => "`<=`, `<`, `>=` or `>`",
+        Rule::line_end => "the end of the line",
+        Rule::colon => "`:`",
+        Rule::comma => "`,`",
+        Rule::equals => "`=`",
+        Rule::lbrace | Rule::points | Rule::overrides => "`{`",
+        Rule::rbrace | Rule::no_brace => "`}`",
+        Rule::lparen | Rule::tuple => "`(`",
+        Rule::rparen => "`)`",
+        Rule::dot => "`.`",
+        Rule::range => "`..`",
+        Rule::caret => "`^`",
+        Rule::layer => "`layer`",
+        Rule::axis => "`axis`",
+        Rule::pin => "`pin`",
+        Rule::into => "`into`",
+        Rule::template => "`as`",
+        Rule::drum => "`drum`",
+        Rule::profile => "`from`",
+        Rule::by_profile => "`by`",
+        Rule::rod_from => "`from`",
+        Rule::rod_to => "`to`",
+        Rule::rod_section => "`section`",
+        other => {
+            // Keyword rules are called after their keyword.
+            let name = format!("{other:?}");
+            return match name.strip_prefix("kw_") {
+                Some(word) => format!("`{word}`"),
+                None => "a statement".into(),
+            };
+        }
+    };
+    text.into()
+}
+
+/// The node of a pair; bytes between its inner pairs become leaves.
+fn node(pair: Pair<'_, Rule>, source: &str) -> Node {
+    let span = pair.as_span();
+    let (start, end) = (span.start(), span.end());
+    let kind = kind(pair.as_rule());
+    let mut children = Vec::new();
+    let mut at = start;
+    let mut inner = pair.into_inner().peekable();
+    let is_token = inner.peek().is_none() && is_token(kind);
+    for child in inner {
+        if matches!(child.as_rule(), Rule::EOI | Rule::line_end) {
+            continue;
+        }
+        let child = node(child, source);
+        fill(source, at..child.start as usize, &mut children);
+        at = child.end as usize;
+        children.push(child);
+    }
+    if !is_token {
+        fill(source, at..end, &mut children);
+    }
+    Node { kind, start: start as u32, end: end as u32, children }
+}
+
+fn is_token(kind: Kind) -> bool {
+    matches!(
+        kind,
+        Kind::Keyword
+            | Kind::Punctuation
+            | Kind::Ident
+            | Kind::Text
+            | Kind::Digits
+            | Kind::Integer
+            | Kind::Exponent
+            | Kind::UnitSymbol
+            | Kind::UnitPower
+            | Kind::UnitOperator
+            | Kind::NoBrace
+    )
+}
+
+fn kind(rule: Rule) -> Kind {
+    match rule {
+        Rule::file => Kind::File,
+        Rule::edition => Kind::Edition,
+        Rule::import => Kind::Import,
+        Rule::path => Kind::Path,
+        Rule::mechanism => Kind::Mechanism,
+        Rule::flexure => Kind::Flexure,
+        Rule::record => Kind::Record,
+        Rule::bad_header => Kind::BadHeader,
+        Rule::bad_heading => Kind::BadHeading,
+        Rule::stray => Kind::Stray,
+        Rule::bad_statement => Kind::BadStatement,
+        Rule::bad_term => Kind::BadTerm,
+        Rule::bad_field => Kind::BadField,
+        Rule::st_param => Kind::Param,
+        Rule::dimension => Kind::Dimension,
+        Rule::st_let => Kind::Let,
+        Rule::st_point => Kind::Point,
+        Rule::st_body => Kind::Body,
+        Rule::points => Kind::Points,
+        Rule::layer => Kind::Layer,
+        Rule::st_joint => Kind::Joint,
+        Rule::bodies => Kind::Bodies,
+        Rule::axis => Kind::Axis,
+        Rule::pin => Kind::Pin,
+        Rule::into => Kind::Into,
+        Rule::template => Kind::Template,
+        Rule::overrides => Kind::Overrides,
+        Rule::field => Kind::Field,
+        Rule::st_material => Kind::MaterialUse,
+        Rule::st_print => Kind::Print,
+        Rule::st_links => Kind::Links,
+        Rule::st_cycle => Kind::Cycle,
+        Rule::st_drive => Kind::Drive,
+        Rule::profile => Kind::Range,
+        Rule::by_profile => Kind::By,
+        Rule::drum => Kind::Drum,
+        Rule::st_rest => Kind::Rest,
+        Rule::st_trace => Kind::Trace,
+        Rule::st_minimize => Kind::Minimize,
+        Rule::term => Kind::Term,
+        Rule::st_require => Kind::Require,
+        Rule::st_export => Kind::Export,
+        Rule::product_name => Kind::Artefact,
+        Rule::st_rod => Kind::Rod,
+        Rule::rod_from => Kind::RodFrom,
+        Rule::rod_to => Kind::RodTo,
+        Rule::rod_section => Kind::RodSection,
+        Rule::st_later => Kind::Later,
+        Rule::value => Kind::Value,
+        Rule::free => Kind::Free,
+        Rule::sum => Kind::Sum,
+        Rule::product => Kind::Product,
+        Rule::unary => Kind::Unary,
+        Rule::power => Kind::Power,
+        Rule::tuple => Kind::Tuple,
+        Rule::call => Kind::Call,
+        Rule::argument => Kind::Argument,
+        Rule::name => Kind::Name,
+        Rule::number => Kind::Number,
+        Rule::unit => Kind::Unit,
+        Rule::unit_factor => Kind::UnitFactor,
+        Rule::ident => Kind::Ident,
+        Rule::text => Kind::Text,
+        Rule::digits => Kind::Digits,
+        Rule::integer => Kind::Integer,
+        Rule::exponent => Kind::Exponent,
+        Rule::unit_symbol => Kind::UnitSymbol,
+        Rule::unit_power => Kind::UnitPower,
+        Rule::unit_op => Kind::UnitOperator,
+        Rule::no_brace => Kind::NoBrace,
+        Rule::colon
+        | Rule::comma
+        | Rule::equals
+        | Rule::lbrace
+        | Rule::rbrace
+        | Rule::lparen
+        | Rule::rparen
+        | Rule::dot
+        | Rule::range
+        | Rule::add_op
+        | Rule::mul_op
+        | Rule::caret
+        | Rule::minus
+        | Rule::compare => Kind::Punctuation,
+        _ => Kind::Keyword,
+    }
+}

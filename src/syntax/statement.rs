@@ -1,0 +1,212 @@
+//! Statements: concrete tree to [`ast::StatementKind`].
+
+use super::ast::{
+    At, Compare, Expr, Ident, Joint, Profile, Rod, RodEnd, Statement, StatementKind, TemplateUse, Term,
+};
+use super::lower::Lower;
+use super::tree::{Kind, Node};
+use crate::diagnostic::{Diagnostic, Origin};
+
+impl Lower<'_> {
+    /// What a statement node says.
+    pub(super) fn statement(&mut self, node: &Node) -> StatementKind {
+        if node.kind == Kind::BadStatement {
+            self.bad_statement(node);
+            return StatementKind::Broken;
+        }
+        self.recovery.reset();
+        match self.read_statement(node) {
+            Some(kind) => kind,
+            None => {
+                // The grammar promises these parts; a mismatch must still not pass silently.
+                let at = self.origin(node);
+                self.report(Diagnostic::error("E0001", "this statement could not be read", at));
+                StatementKind::Broken
+            }
+        }
+    }
+
+    fn read_statement(&mut self, node: &Node) -> Option<StatementKind> {
+        Some(match node.kind {
+            Kind::Param => StatementKind::Param {
+                name: self.ident(node)?,
+                ty: node.first(Kind::Dimension).and_then(|n| self.ident(n)),
+                value: self.value(node)?,
+            },
+            Kind::Let => StatementKind::Let { name: self.ident(node)?, value: self.value(node)? },
+            Kind::Point => StatementKind::Point { name: self.ident(node)?, value: self.value(node)? },
+            Kind::Body => StatementKind::Body {
+                ground: self.text(node.first(Kind::Keyword)?) == "ground",
+                name: self.ident(node)?,
+                points: self.idents(node.first(Kind::Points)?),
+                layer: node.first(Kind::Layer).and_then(|n| self.value(n)),
+            },
+            Kind::Joint => StatementKind::Joint(Box::new(self.joint(node)?)),
+            Kind::MaterialUse => StatementKind::Material(self.ident(node)?),
+            Kind::Print => StatementKind::PrintOn(self.ident(node)?),
+            Kind::Links => StatementKind::Links { height: self.value(node)? },
+            Kind::Cycle => {
+                let mut values = self.values(node).into_iter();
+                StatementKind::Cycle { steps: values.next()?, over: values.next() }
+            }
+            Kind::Drive => self.drive(node)?,
+            Kind::Rest => StatementKind::Rest { joint: self.ident(node)?, value: self.value(node)? },
+            Kind::Trace => {
+                let mut names = self.idents(node).into_iter();
+                let (name, body) = (names.next()?, names.next()?);
+                StatementKind::Trace { name, point: self.value(node)?, body }
+            }
+            Kind::Minimize => self.minimize(node),
+            Kind::Require => self.require(node)?,
+            Kind::Export => StatementKind::Export(
+                node.all(Kind::Artefact).filter_map(|n| n.parts().next()).map(|n| self.expr(n)).collect(),
+            ),
+            Kind::Rod => StatementKind::Rod(Box::new(self.rod(node)?)),
+            Kind::Later => StatementKind::Later { keyword: self.named(node.first(Kind::Keyword)?) },
+            _ => return None,
+        })
+    }
+
+    fn values(&mut self, node: &Node) -> Vec<Expr> {
+        node.all(Kind::Value).map(|n| self.expr(n)).collect()
+    }
+
+    fn joint(&mut self, node: &Node) -> Option<Joint> {
+        let mut names = self.idents(node).into_iter();
+        let (kind, name) = (names.next()?, names.next()?);
+        let mut joint = Joint {
+            kind,
+            name,
+            bodies: self.idents(node.first(Kind::Bodies)?),
+            point: self.value(node)?,
+            axis: None,
+            layer: None,
+            pin: None,
+            into: Vec::new(),
+            template: None,
+        };
+        let mut seen: Vec<(Kind, Origin)> = Vec::new();
+        for clause in node.parts() {
+            let kind = clause.kind;
+            if !matches!(kind, Kind::Axis | Kind::Layer | Kind::Pin | Kind::Into | Kind::Template) {
+                continue;
+            }
+            let first = seen.iter().find(|(k, _)| *k == kind && kind != Kind::Into).map(|(_, at)| *at);
+            if let Some(first) = first {
+                self.twice(clause, first);
+                continue;
+            }
+            seen.push((kind, self.origin(clause)));
+            match kind {
+                Kind::Axis => joint.axis = self.value(clause),
+                Kind::Layer => joint.layer = self.value(clause),
+                Kind::Pin => joint.pin = self.value(clause),
+                Kind::Into => joint.into.extend(self.ident(clause).zip(self.value(clause))),
+                _ => joint.template = self.template(clause),
+            }
+        }
+        Some(joint)
+    }
+
+    fn twice(&mut self, clause: &Node, first: Origin) {
+        let word = clause.first(Kind::Keyword).map_or("", |n| self.text(n));
+        let at = self.origin(clause);
+        self.report(
+            Diagnostic::error("E0008", format!("`{word}` is given twice"), at)
+                .also(first, "first here")
+                .help("keep one of the two"),
+        );
+    }
+
+    fn template(&mut self, node: &Node) -> Option<TemplateUse> {
+        let overrides = match node.first(Kind::Overrides) {
+            Some(list) => list.all(Kind::Field).filter_map(|n| self.field(n)).collect(),
+            None => Vec::new(),
+        };
+        Some(TemplateUse { name: self.ident(node)?, overrides })
+    }
+
+    fn drive(&mut self, node: &Node) -> Option<StatementKind> {
+        let mut names = self.idents(node).into_iter();
+        let (joint, motor) = (names.next()?, names.next());
+        if let Some(drum) = node.first(Kind::Drum).and_then(|n| n.first(Kind::Keyword)) {
+            return Some(StatementKind::Later { keyword: self.named(drum) });
+        }
+        let profile = match (node.first(Kind::Range), node.first(Kind::By)) {
+            (Some(range), _) => {
+                let mut values = self.values(range).into_iter();
+                Profile::Range(values.next()?, values.next()?)
+            }
+            (_, Some(by)) => Profile::Later(self.origin(by)),
+            _ => return None,
+        };
+        let continuous = node.all(Kind::Keyword).any(|n| self.text(n) == "continuous");
+        Some(StatementKind::Drive { joint, profile, motor, continuous })
+    }
+
+    fn minimize(&mut self, node: &Node) -> StatementKind {
+        let mut terms = Vec::new();
+        for child in &node.children {
+            match child.kind {
+                Kind::Term => {
+                    let Some(call) = child.first(Kind::Call) else { continue };
+                    let call = self.expr(call);
+                    terms.push(Term { call, weight: self.value(child), at: self.origin(child) });
+                }
+                Kind::BadTerm => self.bad_term(child),
+                _ => {}
+            }
+        }
+        self.closed(node);
+        StatementKind::Minimize(terms)
+    }
+
+    fn require(&mut self, node: &Node) -> Option<StatementKind> {
+        let mut values = self.values(node).into_iter();
+        let sign = node.first(Kind::Punctuation)?;
+        let op = match self.text(sign) {
+            "<=" => Compare::LessEqual,
+            "<" => Compare::Less,
+            ">=" => Compare::GreaterEqual,
+            _ => Compare::Greater,
+        };
+        let op = At { node: op, at: self.origin(sign) };
+        Some(StatementKind::Require { left: values.next()?, op, right: values.next()? })
+    }
+
+    fn rod(&mut self, node: &Node) -> Option<Rod> {
+        Some(Rod {
+            name: self.ident(node)?,
+            from: self.rod_end(node.first(Kind::RodFrom)?)?,
+            to: self.rod_end(node.first(Kind::RodTo)?)?,
+            section: self.value(node.first(Kind::RodSection)?)?,
+        })
+    }
+
+    fn rod_end(&mut self, node: &Node) -> Option<RodEnd> {
+        let body: Ident = self.ident(node)?;
+        let mut values = self.values(node).into_iter();
+        Some(RodEnd { body, position: values.next()?, along: values.next()? })
+    }
+
+    /// Reports statements in a block of the wrong sort: a mechanism has no rods, a flexure
+    /// nothing but parameters and rods.
+    pub(super) fn placed(&mut self, statements: &[Statement], mechanism: bool) {
+        for statement in statements {
+            let (fits, what) = match &statement.kind {
+                StatementKind::Param { .. } | StatementKind::Let { .. } => (true, ""),
+                StatementKind::Later { .. } | StatementKind::Broken => (true, ""),
+                StatementKind::Rod(_) => (!mechanism, "a rod belongs in a `flexure`"),
+                _ => (mechanism, "this statement belongs in a `mechanism`"),
+            };
+            if !fits {
+                let help = if mechanism {
+                    "a mechanism gets its rods from a joint's `as TEMPLATE`"
+                } else {
+                    "a flexure holds `param`, `let` and `rod` statements"
+                };
+                self.report(Diagnostic::error("E0009", what, statement.at).help(help));
+            }
+        }
+    }
+}
