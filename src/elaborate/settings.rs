@@ -1,0 +1,73 @@
+//! `--set name=value`: values are expressions of the language, parsed like any other text.
+
+use super::codes;
+use crate::diagnostic::{Diagnostic, Origin, SourceMap};
+use crate::syntax::ast::{Expr, Item, StatementKind};
+
+/// One `--set`.
+pub struct Setting {
+    /// What is set.
+    pub path: String,
+    /// To what; none if it could not be understood.
+    pub value: Option<Expr>,
+    /// Its place in the source map.
+    pub at: Origin,
+}
+
+/// All of them, in order.
+#[derive(Default)]
+pub struct Settings(pub Vec<Setting>);
+
+/// What stands before the value in the little file that each setting becomes.
+const BEFORE: &str = "mechanism set {\n    let value = ";
+
+impl Settings {
+    /// Parses the settings; each becomes a file of the source map.
+    pub fn parse(set: &[(String, String)], sources: &mut SourceMap, out: &mut Vec<Diagnostic>) -> Self {
+        let mut all: Vec<Setting> = Vec::new();
+        for (path, text) in set {
+            let wrapped = format!("{BEFORE}{text}\n}}\n");
+            let file = sources.add(format!("--set {path}"), wrapped.clone());
+            let start = BEFORE.len() as u32;
+            let at = Origin { file, start, end: start + text.len() as u32 };
+            let value = match expression(file, &wrapped, text) {
+                Some(e) => Some(e),
+                None => {
+                    out.push(
+                        Diagnostic::error(codes::SET_SYNTAX, format!("`{text}` is not a value for `{path}`"), at)
+                            .help("write for instance `--set r=25 mm`"),
+                    );
+                    None
+                }
+            };
+            if all.iter().any(|s| s.path == *path) {
+                out.push(Diagnostic::error(codes::DUPLICATE, format!("`{path}` is set twice"), at));
+            }
+            all.push(Setting { path: path.clone(), value, at });
+        }
+        Self(all)
+    }
+
+    /// The setting of `path`: its index and value (none: it was not understood).
+    pub fn find(&self, path: &str) -> Option<(usize, Option<&Expr>)> {
+        let i = self.0.iter().position(|s| s.path == path)?;
+        Some((i, self.0.get(i)?.value.as_ref()))
+    }
+}
+
+/// The one expression of the wrapped text, if it is nothing else.
+fn expression(file: u32, wrapped: &str, text: &str) -> Option<Expr> {
+    if text.trim().is_empty() || text.contains(['\n', '\r']) || text.len() > 4096 {
+        return None;
+    }
+    let parsed = crate::syntax::parse(file, wrapped);
+    if parsed.diagnostics.iter().any(Diagnostic::is_error) {
+        return None;
+    }
+    let [Item::Mechanism(m)] = parsed.file.items.as_slice() else { return None };
+    let [statement] = m.statements.as_slice() else { return None };
+    match &statement.kind {
+        StatementKind::Let { value, .. } => Some(value.clone()),
+        _ => None,
+    }
+}
