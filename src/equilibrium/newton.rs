@@ -4,7 +4,7 @@
 use super::model::{Model, State};
 use crate::kinematics::{Constraint, Jacobian};
 use crate::math::Ldlt;
-use crate::rod::RodSystem;
+use crate::rod::{RodSystem, StationStrain};
 use nalgebra::{DMatrix, DVector, SVector};
 
 /// Relative residual of an accepted state, against the largest internal force
@@ -28,6 +28,8 @@ pub enum SolveError {
     NotConverged,
     /// Numbers left the range of the arithmetic.
     NotFinite,
+    /// The model was built without the derivatives that were asked for.
+    NoDerivatives,
 }
 
 /// An accepted equilibrium.
@@ -39,6 +41,8 @@ pub struct Equilibrium {
     pub stable: bool,
     /// Elastic energy, N·mm.
     pub energy_n_mm: f64,
+    /// Strain measures of each rod at its stations.
+    pub strains: Vec<Vec<StationStrain>>,
     /// Newton iterations taken.
     pub iterations: usize,
 }
@@ -47,6 +51,16 @@ impl Equilibrium {
     /// Torque the motor exerts on the drive's second body, N·mm: τ = dΠ/dα = −λ.
     pub fn torque_n_mm(&self, model: &Model, drive: usize) -> f64 {
         -self.state.lambda[model.rows() - model.layout.drives.len() + drive]
+    }
+}
+
+impl Equilibrium {
+    /// True largest von Mises stress over all rods, MPa.
+    pub fn max_stress_mpa(&self, model: &Model) -> f64 {
+        let largest = |(rod, strains): (&super::model::ModelRod, &Vec<StationStrain>)| {
+            rod.rod.largest_stress(strains).map_or(0.0, |s| s.von_mises_mpa)
+        };
+        model.rods.iter().zip(&self.strains).map(largest).fold(0.0, f64::max)
     }
 }
 
@@ -119,7 +133,9 @@ impl Solver {
             if residual.small() {
                 let stable = self.factor(model, &state, true);
                 let energy_n_mm = self.systems.iter().map(|s| s.energy()).sum();
-                return Ok(Equilibrium { state, stable, energy_n_mm, iterations: iteration });
+                let strains =
+                    model.rods.iter().zip(&self.systems).map(|(r, s)| s.strains(&r.rod)).collect();
+                return Ok(Equilibrium { state, stable, energy_n_mm, strains, iterations: iteration });
             }
             self.factor(model, &state, false);
             let step = self.newton_step(model, &state, target);

@@ -3,6 +3,7 @@
 
 use super::model::Model;
 use super::newton::{Equilibrium, SolveError, Solver, gather};
+use crate::rod::StrainDerivatives;
 use nalgebra::{DMatrix, DVector, SMatrix};
 
 /// First derivatives of one equilibrium by the n design parameters.
@@ -14,6 +15,8 @@ pub struct Sensitivity {
     pub lambda: DMatrix<f64>,
     /// Internal increments of each rod (twists and vertices interleaved), internal × n.
     pub internal: Vec<DMatrix<f64>>,
+    /// Strain measures of each rod with their total derivatives.
+    pub strains: Vec<StrainDerivatives>,
 }
 
 /// Reused by one thread.
@@ -44,7 +47,7 @@ impl SensitivityWorkspace {
         let parameters = model.rods.first().map_or(0, |r| r.dq_dp.ncols());
         let mut rhs = DMatrix::zeros(n + m, parameters);
         for (rod, system) in model.rods.iter().zip(&mut solver.systems) {
-            let columns = system.parameter_columns(&rod.rod) * &rod.dq_dp;
+            let columns = system.parameter_columns(&rod.rod).map_err(|_| SolveError::NoDerivatives)? * &rod.dq_dp;
             for (half, body) in rod.bodies.into_iter().enumerate() {
                 if let Some(first) = model.layout.bodies[body].first_dof {
                     let mut rows = rhs.rows_mut(first, 6);
@@ -58,18 +61,27 @@ impl SensitivityWorkspace {
             column.copy_from(&v);
         }
         let mut internal = Vec::with_capacity(model.rods.len());
+        let mut strains = Vec::with_capacity(model.rods.len());
         for (rod, system) in model.rods.iter().zip(&mut solver.systems) {
             let mut d_link = DMatrix::zeros(12, parameters);
             for c in 0..parameters {
                 let v: SMatrix<f64, 12, 1> = gather(model, rod.bodies, &rhs.column(c).clone_owned());
                 d_link.set_column(c, &v);
             }
-            internal.push(system.internal_sensitivity(&d_link, &rod.dq_dp));
+            let d_internal = system
+                .internal_sensitivity(&d_link, &rod.dq_dp)
+                .map_err(|_| SolveError::NoDerivatives)?;
+            let d_strains = system
+                .strain_derivatives(&rod.rod, &d_internal, &d_link, &rod.dq_dp)
+                .map_err(|_| SolveError::NoDerivatives)?;
+            internal.push(d_internal);
+            strains.push(d_strains);
         }
         Ok(Sensitivity {
             links: rhs.rows(0, n).into_owned(),
             lambda: rhs.rows(n, m).into_owned(),
             internal,
+            strains,
         })
     }
 }

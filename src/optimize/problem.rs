@@ -33,14 +33,19 @@ pub struct Trial<'d> {
 }
 
 impl Trial<'_> {
-    /// Largest distance of any trace from its target, mm.
-    pub fn max_error_mm(&self) -> f64 {
+    /// True largest von Mises stress over the cycle, MPa.
+    pub fn max_stress_mpa(&self) -> f64 {
+        self.cycle.states.iter().map(|s| s.max_stress_mpa(&self.model)).fold(0.0, f64::max)
+    }
+
+    /// Largest distance of any trace from its target, mm; none without a trace.
+    pub fn max_error_mm(&self) -> Option<f64> {
         let layout = self.model.layout;
-        let mut largest = 0.0f64;
+        let mut largest = None;
         for trace in &layout.traces {
             for (state, target) in self.cycle.states.iter().zip(&trace.target) {
                 let z = state.state.poses[trace.body].point(&trace.rest);
-                largest = largest.max((z - target).norm());
+                largest = Some((z - target).norm().max(largest.unwrap_or(0.0)));
             }
         }
         largest

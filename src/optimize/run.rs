@@ -31,8 +31,10 @@ pub struct Iteration {
     pub cost: f64,
     /// Contribution of each term.
     pub terms: Vec<f64>,
-    /// Largest distance of any trace from its target, mm.
-    pub max_error_mm: f64,
+    /// Largest distance of any trace from its target, mm; none without a trace.
+    pub max_error_mm: Option<f64>,
+    /// True largest von Mises stress, MPa.
+    pub max_stress_mpa: f64,
 }
 
 /// How a run ended.
@@ -68,7 +70,7 @@ pub struct Shared<'d> {
     /// The problem.
     pub problem: Problem<'d>,
     cancel: &'d AtomicBool,
-    progress: &'d (dyn Fn(&Iteration) + Sync),
+    progress: &'d dyn Fn(&Iteration),
     best: Mutex<Option<(f64, Vec<f64>)>>,
     latest: Mutex<Option<Iteration>>,
 }
@@ -91,6 +93,7 @@ impl<'d> Shared<'d> {
                     cost: trial.cost,
                     terms: trial.terms.clone(),
                     max_error_mm: trial.max_error_mm(),
+                    max_stress_mpa: trial.max_stress_mpa(),
                 });
             }
         }
@@ -119,7 +122,7 @@ pub fn optimize<'d>(
     start: &[f64],
     limit: usize,
     cancel: &'d AtomicBool,
-    progress: &'d (dyn Fn(&Iteration) + Sync),
+    progress: &'d dyn Fn(&Iteration),
 ) -> Optimized {
     let x = problem.to_unit(start);
     let shared = Shared { problem, cancel, progress, best: Mutex::new(None), latest: Mutex::new(None) };

@@ -1,12 +1,15 @@
 //! The whole way from text to artefacts, as one function to be read from top to bottom. No I/O here:
 //! files come in through [`Files`], artefacts go out as names and bytes, time and threads come from outside.
 
+mod compiler;
 mod files;
 mod measure;
 mod progress;
 mod report;
+mod solids;
 mod stages;
 
+pub use compiler::{Compiler, EDGES};
 pub use files::{FileError, Files};
 pub use measure::{aggregate, check_requirements, is_closed, measure};
 pub use progress::{Iteration, Progress, Stage};
@@ -14,7 +17,7 @@ pub use report::{
     Artefact, BuildOutcome, DriveMeasures, GapMeasures, Measures, Origin, RequirementResult, Seconds,
     StressMeasures, TraceMeasures,
 };
-pub use stages::{Checked, Compiler, Failed, Simulation, Solved, Stages};
+pub use stages::{Checked, Failed, Simulation, Solved, Stages};
 
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::emit::arduino::Sketch;
@@ -92,15 +95,17 @@ fn run_build(
     let simulation = keep(stages.simulate(&design, &values), &mut out.diagnostics);
     clock.stop(&mut out.seconds.solve);
     let simulation = simulation?;
+    out.diagnostics.extend(simulation.diagnostics.iter().cloned());
     out.after = Some(measure(&design, &simulation));
     out.requirements = check_requirements(&design, &simulation, &mut out.diagnostics);
 
     // Values to files.
     let clock = Clock::start(progress, Stage::Mesh);
     if design.exports.iter().any(|e| e.kind == ExportKind::Stl)
-        && let Some(parts) = keep(stages.mesh(&design, &values), &mut out.diagnostics)
+        && let Some((parts, found)) = keep(stages.mesh(&design, &values), &mut out.diagnostics)
     {
         out.artefacts.extend(parts);
+        out.diagnostics.extend(found);
     }
     clock.stop(&mut out.seconds.mesh);
     let clock = Clock::start(progress, Stage::Emit);
@@ -141,6 +146,10 @@ pub fn simulate(
             stages.simulate(&design, &values_of(&design, &solution))
         };
         let mut simulation = keep(result, &mut out.diagnostics)?;
+        if !show.rigid {
+            // The conventional motion's findings have been told by the check.
+            out.diagnostics.append(&mut simulation.diagnostics);
+        }
         if !show.poses {
             simulation.motion.bodies.clear();
         }
@@ -163,7 +172,8 @@ fn front_end(
     }
     let design = checked.design?;
     // That it can be assembled all the way is part of being right.
-    keep(stages.rigid(&design), &mut out.diagnostics)?;
+    let rigid = keep(stages.rigid(&design), &mut out.diagnostics)?;
+    out.diagnostics.extend(rigid.diagnostics);
     out.design = Some(design.clone());
     Some(design)
 }

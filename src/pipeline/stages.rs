@@ -1,10 +1,10 @@
-//! The stages as the pipeline sees them: what goes in, what comes out, nothing of how. [`Compiler`] is the
-//! real thing; tests put small mechanisms with known answers in its place.
+//! The stages as the pipeline sees them: what goes in, what comes out, nothing of how.
+//! [`Compiler`](super::Compiler) is the real thing; tests put small mechanisms with known answers in its place.
 
 use super::files::Files;
 use super::progress::Iteration;
 use super::report::Artefact;
-use crate::diagnostic::{Diagnostic, Severity, SourceMap};
+use crate::diagnostic::{Diagnostic, SourceMap};
 use crate::emit::csv::MotionTable;
 use crate::ir::{Design, Solution};
 use std::sync::atomic::AtomicBool;
@@ -32,6 +32,8 @@ pub struct Simulation {
     pub errors_mm: Vec<Vec<f64>>,
     /// Least distance between bodies over the cycle, mm, where asked for.
     pub least_gap_mm: Option<f64>,
+    /// Findings that do not stop the work.
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 /// What the optimiser gives.
@@ -80,58 +82,9 @@ pub trait Stages {
         cancel: &AtomicBool,
     ) -> Result<Solved, Failed>;
 
-    /// One file a printed part.
+    /// One file a printed part, and findings that do not stop the work.
     ///
     /// # Errors
     /// Where no closed solid comes out.
-    fn mesh(&self, design: &Design, values: &[f64]) -> Result<Vec<Artefact>, Failed>;
-}
-
-/// The real stages. This is the only place where the pipeline touches them.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Compiler;
-
-/// A stage that this version does not have.
-fn not_available(stage: &str) -> Failed {
-    vec![Diagnostic {
-        code: "E0900".into(),
-        severity: Severity::Error,
-        message: format!("{stage} is not available yet"),
-        labels: Vec::new(),
-        help: None,
-    }]
-}
-
-impl Stages for Compiler {
-    fn check(
-        &self,
-        _source: &str,
-        _overrides: &[(String, String)],
-        _steps: Option<usize>,
-        _files: &dyn Files,
-    ) -> Checked {
-        Checked { diagnostics: not_available("reading a design"), ..Checked::default() }
-    }
-
-    fn rigid(&self, _design: &Design) -> Result<Simulation, Failed> {
-        Err(not_available("the conventional motion"))
-    }
-
-    fn simulate(&self, _design: &Design, _values: &[f64]) -> Result<Simulation, Failed> {
-        Err(not_available("simulation"))
-    }
-
-    fn optimize(
-        &self,
-        _design: &Design,
-        _start: &[f64],
-        _on_iteration: &dyn Fn(&Iteration),
-        _cancel: &AtomicBool,
-    ) -> Result<Solved, Failed> {
-        Err(not_available("optimisation"))
-    }
-
-    fn mesh(&self, _design: &Design, _values: &[f64]) -> Result<Vec<Artefact>, Failed> {
-        Err(not_available("meshing"))
-    }
+    fn mesh(&self, design: &Design, values: &[f64]) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed>;
 }
