@@ -45,7 +45,10 @@ pub struct RodSystem {
     pub(crate) condensed_hessian: SMatrix<f64, 12, 12>,
     pub(crate) solution: Vec<[f64; 1]>,
     pub(crate) increment: Vec<f64>,
+    pub(crate) columns: Option<Box<super::sensitivity::ParameterColumns>>,
     pub(crate) twist_scale: f64,
+    /// Shift of the factors in use; none since the last assembly.
+    pub(crate) factored: Option<f64>,
 }
 
 /// Position of the numbers of an end in its seven coordinates (x, θ, e).
@@ -101,7 +104,9 @@ impl RodSystem {
             condensed_hessian: SMatrix::zeros(),
             solution: vec![[0.0; 1]; internal + HALF_BANDWIDTH],
             increment: vec![0.0; internal],
+            columns: None,
             twist_scale: 1.0,
+            factored: None,
         }
     }
 
@@ -156,6 +161,8 @@ impl RodSystem {
     pub fn assemble(&mut self, rod: &Rod, state: &RodState, pose_a: &Pose, pose_b: &Pose) {
         debug_assert_eq!(self.n, rod.edges);
         let n = self.n;
+        self.columns = None;
+        self.factored = None;
         self.twist_scale = rod.edge_length_mm();
         self.local_terms(rod, state);
         self.gradient.fill(0.0);

@@ -44,6 +44,7 @@ impl RodSystem {
             let matrix = &self.band[internal.clone()];
             let scaled = |i: usize| if i % 4 == 0 { shift * twist } else { shift };
             if self.factors.factor(matrix, scaled) == 0 {
+                self.factored = Some(shift);
                 report.shift = shift;
                 report.positive_definite = true;
                 return report;
@@ -56,6 +57,7 @@ impl RodSystem {
     /// Factors the internal Hessian as it is, for the inertia at an accepted state and for sensitivities.
     pub fn factor_unshifted(&mut self) -> FactorReport {
         let negative = self.factors.factor(&self.band[FIRST_INTERNAL..4 * self.n - 4], |_| 0.0);
+        self.factored = Some(0.0);
         FactorReport {
             negative_pivots: negative,
             shift: 0.0,

@@ -49,14 +49,21 @@ mod condense;
 mod derivative_tests;
 mod rest;
 mod section;
+mod sensitivity;
+#[cfg(test)]
+mod sensitivity_tests;
+pub mod single;
 mod state;
 mod stencil;
+mod stress;
 
 pub use assemble::RodSystem;
 pub use condense::FactorReport;
 pub use rest::{MIN_EDGES, PARAMETERS, RodError, RodParameters};
 pub use section::{RodMaterial, Stiffness, ellipse_stiffness};
+pub use sensitivity::{ParameterMatrix, SensitivityError};
 pub use state::{RetractError, RodState};
+pub use stress::{SECTION_POINTS, STATION_VALUES, StationStrain, StrainDerivatives, StressSample};
 
 use crate::math::dual::Dual;
 use nalgebra::Vector3;

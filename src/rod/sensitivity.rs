@@ -1,0 +1,284 @@
+//! Sensitivities of a rod to its 17 parameters at an equilibrium (Megaro et al. 2017, eqs. 17–19).
+//!
+//! With y the internal freedoms, z the links' and q the parameters: K y' = −(g_q q' + C z'), and the links
+//! see the condensed column b = g_link,q − Cᵀ K⁻¹ g_int,q. A parameter acts through rest lengths, rest
+//! curvatures and stiffnesses, and through the clamped geometry its links carry: the latter in the chart
+//! centred at the present clamps, in which the mixed second derivative of θ by (φ, q) is ½ of the change of
+//! direction (the other half is the curvature of parallel transport).
+
+use super::assemble::{END_COUPLING, FIRST_INTERNAL, RodSystem, end_coordinates, slot_signs};
+use super::rest::RestShape;
+use super::{PARAMETERS, Rod, stretch_factor};
+use crate::math::dual::Dual;
+use crate::math::{Pose, banded::HALF_BANDWIDTH};
+use nalgebra::{DMatrix, SMatrix, SVector, Vector3};
+
+/// Width of the joint solve: 12 link columns, 17 parameters, padding.
+const WIDTH: usize = 32;
+/// First parameter column.
+const FIRST_PARAMETER: usize = 12;
+
+/// 12 by 17: condensed columns.
+pub type ParameterMatrix = SMatrix<f64, 12, PARAMETERS>;
+
+/// Solutions kept for the chain rule.
+#[derive(Clone, Debug)]
+pub(crate) struct ParameterColumns {
+    condensed: ParameterMatrix,
+    /// K⁻¹ [C, g_int,q], one row per internal freedom.
+    solved: Vec<[f64; WIDTH]>,
+    /// Derivatives by q of the coordinates (x, θ, e) each end carries.
+    pub(crate) ends: [SMatrix<f64, 7, PARAMETERS>; 2],
+}
+
+/// Why sensitivities are not to be had.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SensitivityError {
+    /// The rod was not made by [`Rod::with_derivatives`].
+    NoDerivatives,
+    /// [`RodSystem::parameter_columns`] was not called since the last assembly.
+    NoColumns,
+    /// A matrix has the wrong number of rows or columns.
+    Shape,
+}
+
+impl std::fmt::Display for SensitivityError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::NoDerivatives => "the rod was built without derivatives",
+            Self::NoColumns => "parameter columns were not computed for this state",
+            Self::Shape => "a sensitivity matrix has the wrong shape",
+        })
+    }
+}
+
+impl std::error::Error for SensitivityError {}
+
+type Row = [f64; PARAMETERS];
+
+fn add_scaled(to: &mut Row, s: f64, from: &Row) {
+    for (t, f) in to.iter_mut().zip(from) {
+        *t += s * f;
+    }
+}
+
+impl RodSystem {
+    /// Derivatives of the gradient by the 17 parameters at fixed state and poses, condensed onto the links
+    /// (12 by 17; the links' moved centres do not depend on the parameters). At an equilibrium the links'
+    /// sensitivities solve H dz = −b dq − …. Factors the unshifted Hessian if a shifted one was in use;
+    /// then [`Self::condensed_hessian`] is renewed too.
+    ///
+    /// # Errors
+    /// When the rod has no derivatives.
+    pub fn parameter_columns(
+        &mut self,
+        rod: &Rod,
+        pose_a: &Pose,
+        pose_b: &Pose,
+    ) -> Result<&ParameterMatrix, SensitivityError> {
+        let rest = rod.derivatives.as_deref().ok_or(SensitivityError::NoDerivatives)?;
+        if self.factored != Some(0.0) {
+            self.factor_unshifted();
+            self.condense();
+        }
+        let n = self.n;
+        let ends = [
+            end_derivatives(rest, 0, &pose_a.rotation, rod),
+            end_derivatives(rest, n - 1, &pose_b.rotation, rod),
+        ];
+        let explicit = self.explicit_columns(rod, rest);
+
+        let internal = self.factors.order();
+        let mut solved = vec![[0.0; WIDTH]; internal + HALF_BANDWIDTH];
+        for (row, g) in solved.iter_mut().zip(&explicit[FIRST_INTERNAL..4 * n - 4]) {
+            row[FIRST_PARAMETER..FIRST_PARAMETER + PARAMETERS].copy_from_slice(g);
+        }
+        let mut condensed = ParameterMatrix::zeros();
+        let mut couplings = [SMatrix::<f64, END_COUPLING, 6>::zeros(); 2];
+        for end in 0..2 {
+            let first = if end == 0 { 0 } else { internal - END_COUPLING };
+            couplings[end] = self.coupling(end);
+            let through_clamp = self.end_coupling(end) * ends[end];
+            for (i, row) in solved[first..first + END_COUPLING].iter_mut().enumerate() {
+                for c in 0..6 {
+                    row[6 * end + c] += couplings[end][(i, c)];
+                }
+                for c in 0..PARAMETERS {
+                    row[FIRST_PARAMETER + c] += through_clamp[(i, c)];
+                }
+            }
+            let columns = self.end_columns(end, &explicit, &ends[end]);
+            condensed.fixed_rows_mut::<6>(6 * end).copy_from(&columns);
+        }
+        self.factors.forward(&mut solved, 0);
+        self.factors.backward(&mut solved);
+        solved.truncate(internal);
+        for end in 0..2 {
+            let first = if end == 0 { 0 } else { internal - END_COUPLING };
+            for (i, row) in solved[first..first + END_COUPLING].iter().enumerate() {
+                for r in 0..6 {
+                    for c in 0..PARAMETERS {
+                        condensed[(6 * end + r, c)] -= couplings[end][(i, r)] * row[FIRST_PARAMETER + c];
+                    }
+                }
+            }
+        }
+        let columns = self.columns.insert(Box::new(ParameterColumns { condensed, solved, ends }));
+        Ok(&columns.condensed)
+    }
+
+    /// Condensed columns of the last [`Self::parameter_columns`] for this state.
+    pub fn condensed_columns(&self) -> Option<&ParameterMatrix> {
+        self.columns.as_deref().map(|c| &c.condensed)
+    }
+
+    /// Sensitivity of the internal freedoms, −K⁻¹(C dz + g_q dq): `d_link` is 12 by n, `dq` 17 by n, the
+    /// result (4N − 11) by n, in the chart of [`Rod::retract`].
+    ///
+    /// # Errors
+    /// Without parameter columns for this state, or with matrices of the wrong shape.
+    pub fn internal_sensitivity(
+        &self,
+        d_link: &DMatrix<f64>,
+        dq: &DMatrix<f64>,
+    ) -> Result<DMatrix<f64>, SensitivityError> {
+        let columns = self.columns.as_deref().ok_or(SensitivityError::NoColumns)?;
+        let n = d_link.ncols();
+        if d_link.nrows() != 12 || dq.nrows() != PARAMETERS || dq.ncols() != n {
+            return Err(SensitivityError::Shape);
+        }
+        let mut out = DMatrix::zeros(columns.solved.len(), n);
+        for (p, mut to) in out.column_iter_mut().enumerate() {
+            let (z, q) = (d_link.column(p), dq.column(p));
+            for (value, row) in to.iter_mut().zip(&columns.solved) {
+                let mut sum = 0.0;
+                for c in 0..12 {
+                    sum += row[c] * z[c];
+                }
+                for c in 0..PARAMETERS {
+                    sum += row[FIRST_PARAMETER + c] * q[c];
+                }
+                *value = -sum;
+            }
+        }
+        Ok(out)
+    }
+
+    /// The transposed map, for adjoints: a covector on the internal freedoms becomes one on the links (12)
+    /// and one on the parameters (17).
+    ///
+    /// # Errors
+    /// Without parameter columns for this state, or with a covector of the wrong length.
+    pub fn internal_pull_back(
+        &self,
+        w: &[f64],
+    ) -> Result<(SVector<f64, 12>, SVector<f64, PARAMETERS>), SensitivityError> {
+        let columns = self.columns.as_deref().ok_or(SensitivityError::NoColumns)?;
+        if w.len() != columns.solved.len() {
+            return Err(SensitivityError::Shape);
+        }
+        let mut z = SVector::zeros();
+        let mut q = SVector::zeros();
+        for (w, row) in w.iter().zip(&columns.solved) {
+            for c in 0..12 {
+                z[c] -= w * row[c];
+            }
+            for c in 0..PARAMETERS {
+                q[c] -= w * row[FIRST_PARAMETER + c];
+            }
+        }
+        Ok((z, q))
+    }
+
+    /// Derivative of the whole banded gradient by q through rest quantities and stiffnesses.
+    fn explicit_columns(&self, rod: &Rod, rest: &RestShape<Dual<PARAMETERS>>) -> Vec<Row> {
+        let n = self.n;
+        let mut out = vec![[0.0; PARAMETERS]; 4 * n + 3];
+        let mut local = vec![[[0.0; PARAMETERS]; 4]; n];
+        for j in 1..n - 1 {
+            let (l, l0) = (self.frames[j].l, rest.edge_lengths[j]);
+            // F = EA (l/l̄ − 1)/w; its work on σ is F l.
+            let scale = l / stretch_factor(j, n);
+            add_scaled(&mut local[j][2], scale * (l / l0.re - 1.0), &rest.stiffness[j].ea.eps);
+            add_scaled(&mut local[j][2], -scale * rod.ea[j] * l / (l0.re * l0.re), &l0.eps);
+        }
+        for i in 1..n {
+            let measures = &self.measures[i];
+            let (s0, s1, v) = (&rest.stiffness[i - 1], &rest.stiffness[i], rest.voronoi[i]);
+            for (f, sum) in [s0.ei1 + s1.ei1, s0.ei2 + s1.ei2, s0.gj + s1.gj].into_iter().enumerate() {
+                let b = sum / (v + v);
+                let mut dm = [0.0; PARAMETERS];
+                add_scaled(&mut dm, measures.value[f] - rod.rest_measures[i][f], &b.eps);
+                add_scaled(&mut dm, -b.re, &rest.measures[i][f].eps);
+                for c in 0..4 {
+                    add_scaled(&mut local[i - 1][c], measures.before[f][c], &dm);
+                    add_scaled(&mut local[i][c], measures.after[f][c], &dm);
+                }
+            }
+        }
+        for (j, local) in local.iter().enumerate() {
+            let basis = self.edge_basis(j);
+            add_scaled(&mut out[4 * j + 3], 1.0, &local[3]);
+            for (s, sign) in slot_signs(j, n).into_iter().enumerate() {
+                for r in 0..3 {
+                    for c in 0..3 {
+                        add_scaled(&mut out[4 * (j + s) + r], sign * basis[(r, c)], &local[c]);
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// Derivative of one link's six gradient entries by q, not condensed.
+    fn end_columns(
+        &self,
+        end: usize,
+        explicit: &[Row],
+        carried: &SMatrix<f64, 7, PARAMETERS>,
+    ) -> SMatrix<f64, 6, PARAMETERS> {
+        let index = end_coordinates(end, self.n);
+        let h = SMatrix::<f64, 7, 7>::from_fn(|i, j| {
+            let (row, column) = (index[i].max(index[j]), index[i].min(index[j]));
+            self.band[column][row - column]
+        });
+        let explicit = SMatrix::<f64, 7, PARAMETERS>::from_fn(|i, c| explicit[index[i]][c]);
+        let mut out = self.jacobians[end].transpose() * (explicit + h * carried);
+        let g = SVector::<f64, 7>::from_fn(|i, _| self.gradient[index[i]]);
+        let (gx, ge): (Vector3<f64>, Vector3<f64>) =
+            (g.fixed_rows::<3>(0).into_owned(), g.fixed_rows::<3>(4).into_owned());
+        let frame = &self.frames[if end == 0 { 0 } else { self.n - 1 }];
+        for c in 0..PARAMETERS {
+            let dx: Vector3<f64> = carried.fixed_view::<3, 1>(0, c).into_owned();
+            let de: Vector3<f64> = carried.fixed_view::<3, 1>(4, c).into_owned();
+            let turn = (de - frame.t * frame.t.dot(&de)) / frame.l;
+            let moment = dx.cross(&gx) + de.cross(&ge) + turn * (0.5 * g[3]);
+            let mut column = out.fixed_view_mut::<3, 1>(3, c);
+            column += moment;
+        }
+        out
+    }
+}
+
+/// Derivatives by q of (x, θ, e) carried by the end with clamped edge `edge`, in the present orientation.
+fn end_derivatives(
+    rest: &RestShape<Dual<PARAMETERS>>,
+    edge: usize,
+    rotation: &nalgebra::Matrix3<f64>,
+    rod: &Rod,
+) -> SMatrix<f64, 7, PARAMETERS> {
+    let (x0, x1) = (&rest.vertices[edge], &rest.vertices[edge + 1]);
+    // The vertex shared with the free part.
+    let inner = if edge == 0 { x1 } else { x0 };
+    let m1 = &rod.rest.m1[edge];
+    let t = (rod.rest.vertices[edge + 1] - rod.rest.vertices[edge]).normalize();
+    let m2 = t.cross(m1);
+    let mut out = SMatrix::<f64, 7, PARAMETERS>::zeros();
+    for c in 0..PARAMETERS {
+        let at = |v: &[Dual<PARAMETERS>; 3]| Vector3::new(v[0].eps[c], v[1].eps[c], v[2].eps[c]);
+        out.fixed_view_mut::<3, 1>(0, c).copy_from(&(rotation * at(inner)));
+        out[(3, c)] = m2.dot(&at(&rest.m1[edge]));
+        out.fixed_view_mut::<3, 1>(4, c).copy_from(&(rotation * (at(x1) - at(x0))));
+    }
+    out
+}

@@ -1,0 +1,248 @@
+//! Parameter columns, equilibrium sensitivities and stress derivatives against differences.
+
+use super::derivative_tests::{MATERIAL, curved, difference, random_sample};
+use super::single::{EndLoad, SingleRod};
+use super::*;
+use nalgebra::{DMatrix, DVector, SMatrix};
+
+/// Size of a parameter's change in differences: vertices move by a few hundredths of a millimetre.
+fn step_of(k: usize) -> f64 {
+    if k < 12 {
+        4e-2
+    } else if k < 15 {
+        4e-3
+    } else {
+        4e-3
+    }
+}
+
+fn shifted(q: &RodParameters, k: usize, s: f64) -> RodParameters {
+    let mut q = q.to_array();
+    q[k] += s;
+    RodParameters::from_array(&q)
+}
+
+#[test]
+fn parameter_columns_match_differences() {
+    let sample = random_sample(5, 8);
+    let mut system = RodSystem::new(&sample.rod);
+    system.assemble(&sample.rod, &sample.state, &sample.a, &sample.b);
+    system.factor_unshifted();
+    system.condense();
+    let condensed = *system.parameter_columns(&sample.rod, &sample.a, &sample.b).unwrap();
+    let n = sample.rod.internal_freedoms();
+    let p = -system.internal_sensitivity(&DMatrix::zeros(12, 17), &DMatrix::identity(17, 17)).unwrap();
+    let q0 = curved();
+    let energy = |k: usize, dq: f64, i: usize, d: f64| {
+        let rod = Rod::new(&shifted(&q0, k, dq), MATERIAL, 8).unwrap();
+        let mut all = DVector::zeros(n + 12);
+        all[i] = d;
+        let v = |i: usize| Vector3::new(all[n + i], all[n + i + 1], all[n + i + 2]);
+        let (a, b) = (sample.a.retract(&v(0), &v(3)), sample.b.retract(&v(6), &v(9)));
+        let mut state = sample.state.clone();
+        rod.retract(&mut state, &all.as_slice()[..n], &a, &b).unwrap();
+        rod.energy(&state)
+    };
+    // Mixed second derivatives in the chart of the present state.
+    let mut columns = DMatrix::zeros(n + 12, 17);
+    for k in 0..17 {
+        let dq = step_of(k) * 0.2;
+        let own_q = difference(|s| energy(k, s * dq, 0, 0.0), 1.0).1;
+        for i in 0..n + 12 {
+            let di = 4e-3;
+            let both = difference(|s| energy(k, s * dq, i, s * di), 1.0).1;
+            let own_d = difference(|s| energy(k, 0.0, i, s * di), 1.0).1;
+            columns[(i, k)] = 0.5 * (both - own_q - own_d) / (dq * di);
+        }
+    }
+    let (mut inner, mut coupling) = (DMatrix::zeros(n, n), DMatrix::zeros(n, 12));
+    for i in 0..n {
+        for d in 0..=10.min(n - 1 - i) {
+            let v = system.band[assemble::FIRST_INTERNAL + i][d];
+            inner[(i + d, i)] = v;
+            inner[(i, i + d)] = v;
+        }
+    }
+    for end in 0..2 {
+        coupling
+            .view_mut((if end == 0 { 0 } else { n - 8 }, 6 * end), (8, 6))
+            .copy_from(&system.coupling(end));
+    }
+    let want_internal = columns.rows(0, n);
+    let got_internal = &inner * &p;
+    let got_link = DMatrix::from_fn(12, 17, |i, j| condensed[(i, j)]) + coupling.transpose() * &p;
+    let want_link = columns.rows(n, 12);
+    for k in 0..17 {
+        let scale = columns.column(k).amax();
+        let e1 = (got_internal.column(k) - want_internal.column(k)).amax() / scale;
+        let e2 = (got_link.column(k) - want_link.column(k)).amax() / scale;
+        println!("q{k}: internal {e1:.1e}, link {e2:.1e} of {scale:.2e}");
+        assert!(e1 < 1e-6 && e2 < 1e-6);
+    }
+    // The transposed map is the transpose.
+    let w: Vec<f64> = (0..n).map(|i| (i as f64 * 0.7).sin()).collect();
+    let (_, pulled) = system.internal_pull_back(&w).unwrap();
+    let want = -p.tr_mul(&DVector::from_vec(w));
+    assert!((0..17).all(|k| (pulled[k] - want[k]).abs() < 1e-9 * want.amax()));
+}
+
+fn clamped(q: &RodParameters) -> SingleRod {
+    let rod = Rod::with_derivatives(q, MATERIAL, 20).unwrap();
+    let mut s = SingleRod::new(rod, Vector3::zeros(), Vector3::new(19.0, 7.0, 3.0));
+    for _ in 0..4 {
+        s.move_b(&Vector3::new(-0.4, 0.5, 0.2), &Vector3::new(0.04, -0.03, 0.12)).unwrap();
+    }
+    s
+}
+
+const LOAD: EndLoad = EndLoad {
+    force: Vector3::new(-0.3, 0.5, 0.2),
+    point: Vector3::new(21.0, 8.0, 1.0),
+    moment: Vector3::new(0.0, 0.0, 0.0),
+};
+
+fn cantilever(q: &RodParameters) -> SingleRod {
+    let rod = Rod::with_derivatives(q, MATERIAL, 20).unwrap();
+    let mut s = SingleRod::new(rod, Vector3::zeros(), Vector3::new(19.0, 7.0, 3.0));
+    for k in 1..=4 {
+        let part = EndLoad { force: LOAD.force * 0.25 * f64::from(k), ..LOAD };
+        s.solve(&part, [true; 6]).unwrap();
+    }
+    s
+}
+
+/// All results that must have the right derivatives: inner vertices, frames, pose of B, stresses.
+fn results(s: &SingleRod) -> Vec<f64> {
+    let mut out = Vec::new();
+    for v in &s.state.vertices {
+        out.extend_from_slice(v.as_slice());
+    }
+    out.extend_from_slice(s.pose_b.translation.as_slice());
+    for row in s.rod.stresses(&s.system.strains(&s.rod)) {
+        out.extend_from_slice(&row);
+    }
+    out
+}
+
+fn check(build: impl Fn(&RodParameters) -> SingleRod, free: bool) {
+    let q0 = curved();
+    let mut s = build(&q0);
+    let (pose_a, pose_b) = (s.pose_a, s.pose_b);
+    let h: SMatrix<f64, 12, 12> = *s.system.condensed_hessian();
+    let columns = *s.system.parameter_columns(&s.rod, &pose_a, &pose_b).unwrap();
+    let dq = DMatrix::identity(17, 17);
+    let mut d_link = DMatrix::zeros(12, 17);
+    if free {
+        let (_, lh) = LOAD.derivatives(&pose_b);
+        let k: SMatrix<f64, 6, 6> = h.fixed_view::<6, 6>(6, 6) + lh;
+        let b: SMatrix<f64, 6, 17> = columns.fixed_rows::<6>(6).into_owned();
+        let d = k.lu().solve(&-b).unwrap();
+        d_link.rows_mut(6, 6).copy_from(&d);
+    }
+    let d_internal = s.system.internal_sensitivity(&d_link, &dq).unwrap();
+    let derivatives = s.system.strain_derivatives(&s.rod, &d_internal, &d_link, &dq).unwrap();
+    let edges = s.rod.edges();
+    let stations = edges + 1;
+    let base = results(&s);
+    for k in 0..17 {
+        let mut want = Vec::new();
+        // Inner vertices only: those the ends carry are not internal.
+        for j in 2..=edges - 2 {
+            for c in 0..3 {
+                want.push((3 * j + c, d_internal[(4 * j - 7 + c, k)]));
+            }
+        }
+        let pose = 3 * (edges + 1);
+        for c in 0..3 {
+            want.push((pose + c, d_link[(6 + c, k)]));
+        }
+        let stress = pose + 3;
+        for station in 0..stations {
+            for point in 0..SECTION_POINTS {
+                let (mises, d) = derivatives.stress(&s.rod, station, point).unwrap();
+                let at = stress + station * SECTION_POINTS + point;
+                assert!((mises - base[at]).abs() < 1e-9 * (1.0 + mises));
+                want.push((at, d[k]));
+            }
+        }
+        let dq = step_of(k);
+        let samples: Vec<Vec<f64>> =
+            [-2.0, -1.0, 1.0, 2.0].map(|s| results(&build(&shifted(&q0, k, s * dq * 0.25)))).to_vec();
+        let mut worst = [0.0f64; 2];
+        let mut scale = [0.0f64; 2];
+        for (at, _) in &want {
+            let d = (8.0 * (samples[2][*at] - samples[1][*at]) - (samples[3][*at] - samples[0][*at]))
+                / (12.0 * dq * 0.25);
+            let kind = usize::from(*at >= stress);
+            scale[kind] = scale[kind].max(d.abs());
+        }
+        for (at, got) in &want {
+            let d = (8.0 * (samples[2][*at] - samples[1][*at]) - (samples[3][*at] - samples[0][*at]))
+                / (12.0 * dq * 0.25);
+            let kind = usize::from(*at >= stress);
+            worst[kind] = worst[kind].max((got - d).abs() / scale[kind]);
+        }
+        println!("q{k}: shape {:.1e}, stress {:.1e}", worst[0], worst[1]);
+        assert!(worst[0] < 1e-6 && worst[1] < 1e-6, "q{k}: {worst:?}");
+    }
+}
+
+#[test]
+fn clamped_sensitivities_match_resolving() {
+    check(clamped, false);
+}
+
+#[test]
+fn cantilever_sensitivities_match_resolving() {
+    check(cantilever, true);
+}
+
+/// Axial strain over the section must give back the bending energy, and the inside of a bend be compressed.
+#[test]
+fn section_integral_is_the_bending_energy() {
+    let s = StationStrain { kappa1: 0.02, kappa2: -0.01, a: 0.4, b: 2.5, ..StationStrain::default() };
+    let (mut sum, rings, spokes) = (0.0, 400, 64);
+    for i in 0..rings {
+        let r = (f64::from(i) + 0.5) / f64::from(rings);
+        for k in 0..spokes {
+            let phi = std::f64::consts::TAU * f64::from(k) / f64::from(spokes);
+            let strain = s.axial_strain(s.a * r * phi.cos(), s.b * r * phi.sin());
+            let area = s.a * s.b * r / f64::from(rings) * std::f64::consts::TAU / f64::from(spokes);
+            sum += 0.5 * MATERIAL.e_mpa * strain * strain * area;
+        }
+    }
+    let k = ellipse_stiffness(s.a, s.b, &MATERIAL);
+    let want = 0.5 * (k.ei1 * s.kappa1 * s.kappa1 + k.ei2 * s.kappa2 * s.kappa2);
+    assert!((sum - want).abs() < 1e-5 * want, "{sum} {want}");
+    // Shear stress of the same section against GJ.
+    let t = StationStrain { twist: 0.03, a: 0.4, b: 2.5, ..StationStrain::default() };
+    let mut sum = 0.0;
+    for i in 0..rings {
+        let r = (f64::from(i) + 0.5) / f64::from(rings);
+        for k in 0..spokes {
+            let phi = std::f64::consts::TAU * f64::from(k) / f64::from(spokes);
+            let [gx, gy] = t.shear_strains(t.a * r * phi.cos(), t.b * r * phi.sin());
+            let area = t.a * t.b * r / f64::from(rings) * std::f64::consts::TAU / f64::from(spokes);
+            sum += 0.5 * MATERIAL.shear_modulus_mpa() * (gx * gx + gy * gy) * area;
+        }
+    }
+    assert!((sum - 0.5 * k.gj * 0.03 * 0.03).abs() < 1e-5 * sum);
+
+    let rod = Rod::new(
+        &RodParameters::straight(Vector3::zeros(), Vector3::x() * 30.0, Vector3::z(), 0.4, 2.5),
+        MATERIAL,
+        20,
+    )
+    .unwrap();
+    let mut s = SingleRod::new(rod, Vector3::zeros(), Vector3::x() * 30.0);
+    s.solve(&EndLoad { moment: Vector3::z() * 3.0, ..EndLoad::NONE }, [true; 6]).unwrap();
+    let strains = s.system.strains(&s.rod);
+    // m₁ = m₂ × t = z × x = y; bent towards +y: fibres at +y are on the inside.
+    assert!(s.rod.rest_state().m1[0].dot(&Vector3::y()) > 0.999);
+    assert!(s.pose_b.translation.y > 0.0);
+    let inside = s.rod.stress_sample(&strains, 10, 0).unwrap();
+    let outside = s.rod.stress_sample(&strains, 10, SECTION_POINTS / 2).unwrap();
+    assert!(inside.axial_mpa < 0.0 && outside.axial_mpa > 0.0);
+    let want = 3.0 / 188.4955592 * 0.4 * 1500.0;
+    assert!((outside.axial_mpa - want).abs() < 1e-3 * want, "{} {want}", outside.axial_mpa);
+}

@@ -1,0 +1,188 @@
+//! Newton's method for one rod with link A fixed and link B free, loaded or prescribed: the smallest whole
+//! problem, for references and quick checks of one flexure. Mechanisms are solved by `equilibrium`.
+
+use super::{FactorReport, RetractError, Rod, RodState, RodSystem};
+use crate::math::Pose;
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use std::fmt;
+
+/// Most iterations of one solve.
+const MAX_ITERATIONS: usize = 100;
+/// Residual force relative to the largest internal force; a decade above what the last Newton step leaves.
+const RELATIVE_RESIDUAL: f64 = 1e-9;
+/// Smallest force scale, in units of EI/L².
+const LEAST_FORCE: f64 = 1e-3;
+/// Longest turn of link B in one iteration, rad.
+const MAX_TURN: f64 = 0.5;
+
+/// Dead loads on link B.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EndLoad {
+    /// Force fixed in space, N.
+    pub force: Vector3<f64>,
+    /// Point of link B it acts at, rest coordinates, mm.
+    pub point: Vector3<f64>,
+    /// Moment, N·mm: conservative only while the link turns about this axis.
+    pub moment: Vector3<f64>,
+}
+
+impl EndLoad {
+    /// No load.
+    pub const NONE: Self = Self {
+        force: Vector3::new(0.0, 0.0, 0.0),
+        point: Vector3::new(0.0, 0.0, 0.0),
+        moment: Vector3::new(0.0, 0.0, 0.0),
+    };
+
+    /// Gradient and Hessian of the load's potential by the increment of `pose`.
+    pub fn derivatives(&self, pose: &Pose) -> (SVector<f64, 6>, SMatrix<f64, 6, 6>) {
+        let r = pose.arm(&self.point);
+        let mut g = SVector::<f64, 6>::zeros();
+        g.fixed_rows_mut::<3>(0).copy_from(&-self.force);
+        g.fixed_rows_mut::<3>(3).copy_from(&-(r.cross(&self.force) + self.moment));
+        let outer = self.force * r.transpose();
+        let mut h = SMatrix::<f64, 6, 6>::zeros();
+        h.fixed_view_mut::<3, 3>(3, 3)
+            .copy_from(&(Matrix3::identity() * self.force.dot(&r) - (outer + outer.transpose()) * 0.5));
+        (g, h)
+    }
+}
+
+/// Why no equilibrium was reached.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SingleError {
+    /// The residual stayed above tolerance.
+    NotConverged {
+        /// Last residual, N.
+        residual: f64,
+    },
+    /// A step stayed too long however often it was halved.
+    Step(RetractError),
+    /// The link's stiffness matrix is singular.
+    Singular,
+}
+
+impl fmt::Display for SingleError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotConverged { residual } => write!(f, "no equilibrium: residual {residual:.2e} N"),
+            Self::Step(e) => write!(f, "no equilibrium: {e}"),
+            Self::Singular => write!(f, "no equilibrium: the free link has a singular stiffness"),
+        }
+    }
+}
+
+impl std::error::Error for SingleError {}
+
+/// One rod between a fixed link A and a link B.
+#[derive(Clone, Debug)]
+pub struct SingleRod {
+    /// The rod.
+    pub rod: Rod,
+    /// Its present state.
+    pub state: RodState,
+    /// Pose of link A.
+    pub pose_a: Pose,
+    /// Pose of link B.
+    pub pose_b: Pose,
+    /// Workspace; after a solve, assembled and condensed at the equilibrium, unshifted.
+    pub system: RodSystem,
+    /// Factor report at the last equilibrium.
+    pub report: Option<FactorReport>,
+}
+
+impl SingleRod {
+    /// At rest; the reference points of the links (about which moments are taken) in rest coordinates.
+    pub fn new(rod: Rod, center_a: Vector3<f64>, center_b: Vector3<f64>) -> Self {
+        let system = RodSystem::new(&rod);
+        let (pose_a, pose_b) = (Pose::rest(center_a), Pose::rest(center_b));
+        Self { state: rod.rest_state(), rod, pose_a, pose_b, system, report: None }
+    }
+
+    fn assemble(&mut self) {
+        self.system.assemble(&self.rod, &self.state, &self.pose_a, &self.pose_b);
+    }
+
+    /// Applies increments of B and the matching internal ones, halved until the rod follows.
+    fn advance(&mut self, d: &SVector<f64, 12>, whole: bool) -> Result<(), SingleError> {
+        let turn = d.fixed_rows::<3>(9).norm();
+        let mut scale = if whole { 1.0 } else { (MAX_TURN / turn.max(f64::MIN_POSITIVE)).min(1.0) };
+        let internal = self.system.back_substitute(d).to_vec();
+        let mut outcome = Ok(());
+        for _ in 0..30 {
+            let scaled: Vec<f64> = internal.iter().map(|x| x * scale).collect();
+            let step = if whole { 1.0 } else { scale };
+            let b = self.pose_b.retract(&(d.fixed_rows::<3>(6) * step), &(d.fixed_rows::<3>(9) * step));
+            outcome = self.rod.retract(&mut self.state, &scaled, &self.pose_a, &b);
+            if outcome.is_ok() {
+                self.pose_b = b;
+                return Ok(());
+            }
+            scale *= 0.5;
+        }
+        outcome.map_err(SingleError::Step)
+    }
+
+    /// Moves link B by an increment, with the rod following to first order, and solves again.
+    ///
+    /// # Errors
+    /// When no equilibrium is reached.
+    pub fn move_b(&mut self, du: &Vector3<f64>, dphi: &Vector3<f64>) -> Result<usize, SingleError> {
+        self.assemble();
+        self.system.factor();
+        self.system.condense();
+        let mut d = SVector::<f64, 12>::zeros();
+        d.fixed_rows_mut::<3>(6).copy_from(du);
+        d.fixed_rows_mut::<3>(9).copy_from(dphi);
+        self.advance(&d, true)?;
+        self.solve(&EndLoad::NONE, [false; 6])
+    }
+
+    /// Newton's method for the internal freedoms and the `free` ones of link B (du, dφ). Returns the
+    /// number of iterations.
+    ///
+    /// # Errors
+    /// When no equilibrium is reached; the state is then the last iterate.
+    pub fn solve(&mut self, load: &EndLoad, free: [bool; 6]) -> Result<usize, SingleError> {
+        let mut residual = f64::INFINITY;
+        let length = self.rod.length_mm();
+        let least = LEAST_FORCE * self.rod.least_bending_stiffness() / (length * length);
+        for iteration in 0..MAX_ITERATIONS {
+            self.assemble();
+            self.system.factor();
+            let (g, h) = self.system.condense();
+            let (lg, lh) = load.derivatives(&self.pose_b);
+            let mut g6: SVector<f64, 6> = g.fixed_rows::<6>(6) + lg;
+            let mut h6: SMatrix<f64, 6, 6> = h.fixed_view::<6, 6>(6, 6) + lh;
+            for (i, free) in free.into_iter().enumerate() {
+                if !free {
+                    g6[i] = 0.0;
+                    h6.row_mut(i).fill(0.0);
+                    h6.column_mut(i).fill(0.0);
+                    h6[(i, i)] = 1.0;
+                }
+            }
+            // What the condensed gradient misses while the rod is out of balance is the residual itself.
+            let link = (0..6)
+                .filter(|&i| free[i])
+                .map(|i| {
+                    let g = self.system.link_gradient()[6 + i] + lg[i];
+                    if i < 3 { g } else { g / length }
+                })
+                .fold(0.0f64, |m, x| m.hypot(x));
+            residual = self.system.internal_residual_norm().hypot(link);
+            let scale = self.system.largest_internal_force().max(least);
+            let tolerance = RELATIVE_RESIDUAL * scale + self.system.rounding_floor(&self.rod, &self.state);
+            if residual <= tolerance {
+                self.report = Some(self.system.factor_unshifted());
+                self.system.condense();
+                return Ok(iteration);
+            }
+            let step = h6.lu().solve(&-g6).ok_or(SingleError::Singular)?;
+            let mut d = SVector::<f64, 12>::zeros();
+            d.fixed_rows_mut::<6>(6).copy_from(&step);
+            self.advance(&d, false)?;
+        }
+        Err(SingleError::NotConverged { residual })
+    }
+}
