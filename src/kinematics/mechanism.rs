@@ -3,9 +3,15 @@
 
 use super::constraint::{Constraint, HingeAngle};
 use crate::diagnostic::Diagnostic;
-use crate::ir::{Design, JointId, JointKind};
+use crate::ir::{Design, Drive, JointId, JointKind};
 use crate::math::Pose;
 use nalgebra::Vector3;
+
+/// Sizes beyond which a file is taken for a mistake: the work grows with the cube of the first and linearly with
+/// the others.
+const MAX_MOVING_BODIES: usize = 100;
+const MAX_STEPS: usize = 100_000;
+const MAX_DRIVE_RAD: f64 = 100.0 * std::f64::consts::TAU;
 
 /// A mechanism in its drawing pose. Scaled unknowns are (du / L, dφ) of every moving body.
 #[derive(Clone, Debug)]
@@ -152,12 +158,24 @@ fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
     let joints = design.joints.iter().all(|j| j.bodies.iter().all(body));
     let drives = design.drives.iter().all(|d| d.joint < design.joints.len());
     let traces = design.traces.iter().all(|t| body(&t.body));
+    let moving = design.bodies.iter().filter(|b| !b.ground).count();
+    let bounded = |d: &Drive| {
+        [d.rest_rad, d.profile.value_rad(0.0), d.profile.value_rad(1.0)]
+            .iter()
+            .all(|x| x.abs() <= MAX_DRIVE_RAD)
+    };
     let problem = if p.len() != design.free.len() {
         "the number of free values is not the design's"
     } else if !(joints && drives && traces) {
         "the design refers to bodies or joints it does not have"
-    } else if design.cycle.steps == 0 {
-        "the cycle has no steps"
+    } else if moving == 0 {
+        "the mechanism has no link that could move"
+    } else if moving > MAX_MOVING_BODIES {
+        "more than 100 links are not available yet"
+    } else if design.cycle.steps == 0 || design.cycle.steps > MAX_STEPS {
+        "a cycle has 1 to 100000 steps"
+    } else if !design.drives.iter().all(bounded) {
+        "a drive turns at most 100 times in a cycle"
     } else {
         return Ok(());
     };
