@@ -138,9 +138,15 @@ fn loose(mechanism: &Mechanism, held: &Rank) -> Vec<usize> {
     (0..shares.len()).filter(|i| shares[*i] > TAKES_PART * largest && largest > 0.0).collect()
 }
 
-/// `a`, `b` and `c`
+/// `a`, `b` and `c`; of many the first five.
 pub(super) fn names<'a>(all: impl Iterator<Item = &'a String>) -> String {
+    const SHOWN: usize = 5;
     let mut quoted: Vec<String> = all.map(|n| format!("`{n}`")).collect();
+    if quoted.len() > SHOWN + 1 {
+        let more = quoted.len() - SHOWN;
+        quoted.truncate(SHOWN);
+        quoted.push(format!("{more} others"));
+    }
     match quoted.pop() {
         Some(last) if !quoted.is_empty() => format!("{} and {last}", quoted.join(", ")),
         Some(last) => last,
