@@ -38,52 +38,18 @@ impl Mobility {
     /// Mobility of a mechanism at a generic pose near the drawing.
     pub fn of(mechanism: &Mechanism) -> Self {
         let drives = mechanism.design.drives.len();
-        let mut best: Option<(Rank, Rank)> = None;
-        let mut consider = |at: &[Pose]| {
-            let drive: Vec<f64> =
-                mechanism.design.drives.iter().map(|d| mechanism.angles[d.joint].value(at, 0.0)).collect();
-            let rows = Rows::at(mechanism, at, &drive);
-            let (free, held) = (rows.rank(false), rows.rank(true));
-            if best.as_ref().is_none_or(|(f, h)| (free.rank, held.rank) > (f.rank, h.rank)) {
-                best = Some((free, held));
-            }
-        };
-        // As drawn, then nudged: a pose that is special (flat, folded, a dead point) has too small a rank.
-        consider(&mechanism.drawing);
-        let drawn = Rows::at(mechanism, &mechanism.drawing, &[]).rank(false);
-        for sign in [NUDGE, -NUDGE] {
-            // Unequal shares, so that two freedoms do not stay in a special relation.
-            let share = |i: usize| sign / (1.0 + 0.37 * i as f64);
-            let along = drawn.null.iter().enumerate().map(|(i, v)| v * share(i));
-            let start = moved(mechanism, &mechanism.drawing, &along.fold(zeros(mechanism), |sum, v| sum + v));
-            if let Some(at) = correct(mechanism, &start, &[]) {
-                consider(&at.poses);
-            }
-            let drive: Vec<f64> = (0..drives).map(share).collect();
-            if let Some(at) = correct(mechanism, &mechanism.drawing, &drive) {
-                consider(&at.poses);
-            }
-        }
-        let moving_bodies = mechanism.moving_bodies();
-        let Some((free, held)) = best else {
-            return Self {
-                moving_bodies,
-                freedoms: 0,
-                drives,
-                rows: 0,
-                redundant: 0,
-                undetermined: 0,
-                loose_bodies: Vec::new(),
-            };
-        };
+        let drawn = Ranks::at(mechanism, &mechanism.drawing);
+        // Where the drives determine the motion, constraints and drives together have the largest rank there is.
+        let determined = drawn.held.null.is_empty() && drawn.free.null.len() == drives;
+        let best = if determined { drawn } else { drawn.or_generic(mechanism) };
         Self {
-            moving_bodies,
-            freedoms: mechanism.unknowns() - free.rank,
+            moving_bodies: mechanism.moving_bodies(),
+            freedoms: best.free.null.len(),
             drives,
-            rows: free.rows,
-            redundant: free.rows - free.rank,
-            undetermined: held.null.len(),
-            loose_bodies: loose(mechanism, &held),
+            rows: best.free.rows,
+            redundant: best.free.rows - best.free.rank,
+            undetermined: best.held.null.len(),
+            loose_bodies: loose(mechanism, &best.held),
         }
     }
 
@@ -126,8 +92,41 @@ impl Mobility {
     }
 }
 
-fn zeros(mechanism: &Mechanism) -> DVector<f64> {
-    DVector::zeros(mechanism.unknowns())
+/// Ranks at one pose with the drives released and held.
+struct Ranks {
+    free: Rank,
+    held: Rank,
+}
+
+impl Ranks {
+    fn at(mechanism: &Mechanism, poses: &[Pose]) -> Self {
+        let value = |d: &crate::ir::Drive| mechanism.angles[d.joint].value(poses, 0.0);
+        let drive: Vec<f64> = mechanism.design.drives.iter().map(value).collect();
+        let rows = Rows::at(mechanism, poses, &drive);
+        Self { free: rows.rank(false), held: rows.rank(true) }
+    }
+
+    /// A pose that is special only as drawn (flat, folded, a dead point) has too small a rank: tries some nudged
+    /// along the free motions and along the drives, and keeps the largest.
+    fn or_generic(self, mechanism: &Mechanism) -> Self {
+        let mut nudged = Vec::new();
+        for sign in [NUDGE, -NUDGE] {
+            // Unequal shares, so that two freedoms do not stay in a special relation.
+            let share = |i: usize| sign / (1.0 + 0.37 * i as f64);
+            let mut way = DVector::zeros(mechanism.unknowns());
+            for (i, v) in self.free.null.iter().enumerate() {
+                way += v * share(i);
+            }
+            nudged.extend(correct(mechanism, &moved(mechanism, &mechanism.drawing, &way), &[]));
+            let drive: Vec<f64> = (0..mechanism.design.drives.len()).map(share).collect();
+            nudged.extend(correct(mechanism, &mechanism.drawing, &drive));
+        }
+        let others = nudged.iter().map(|at| Self::at(mechanism, &at.poses));
+        others.fold(self, |best, other| {
+            let larger = (other.free.rank, other.held.rank) > (best.free.rank, best.held.rank);
+            if larger { other } else { best }
+        })
+    }
 }
 
 /// Bodies with a share in the null motions.
@@ -139,9 +138,15 @@ fn loose(mechanism: &Mechanism, held: &Rank) -> Vec<usize> {
     (0..shares.len()).filter(|i| shares[*i] > TAKES_PART * largest && largest > 0.0).collect()
 }
 
-/// `a`, `b` and `c`
+/// `a`, `b` and `c`; of many the first five.
 pub(super) fn names<'a>(all: impl Iterator<Item = &'a String>) -> String {
+    const SHOWN: usize = 5;
     let mut quoted: Vec<String> = all.map(|n| format!("`{n}`")).collect();
+    if quoted.len() > SHOWN + 1 {
+        let more = quoted.len() - SHOWN;
+        quoted.truncate(SHOWN);
+        quoted.push(format!("{more} others"));
+    }
     match quoted.pop() {
         Some(last) if !quoted.is_empty() => format!("{} and {last}", quoted.join(", ")),
         Some(last) => last,
