@@ -116,7 +116,9 @@ impl<'a> Evaluator<'a> {
         (re, r): (&'a Expr, &Value),
         at: Origin,
     ) -> Outcome<Value> {
-        let words = if add { format!("{} + {}", l.describe(), r.describe()) } else {
+        let words = if add {
+            format!("{} + {}", l.describe(), r.describe())
+        } else {
             format!("{} − {}", l.describe(), r.describe())
         };
         let dims = |v: &Value| match v {
@@ -140,8 +142,11 @@ impl<'a> Evaluator<'a> {
             }
         }
         if code == codes::MISSING_UNIT {
-            let (e, other) = if dims(l).is_some_and(Dimension::is_number) { (le, dims(r)) } else { (re, dims(l)) };
-            if let (ExprKind::Number { value, .. }, Some(unit)) = (&e.kind, other.and_then(Dimension::suggestion)) {
+            let (e, other) =
+                if dims(l).is_some_and(Dimension::is_number) { (le, dims(r)) } else { (re, dims(l)) };
+            if let (ExprKind::Number { value, .. }, Some(unit)) =
+                (&e.kind, other.and_then(Dimension::suggestion))
+            {
                 d = d.help(format!("write `{value} {unit}`"));
             }
         } else if matches!((l, r), (Value::Point(_), Value::Point(_))) {
@@ -170,17 +175,15 @@ impl<'a> Evaluator<'a> {
                 let dim = self.dimension(a.dim.times(b.dim), at)?;
                 Ok(Value::Scalar(Scalar { id: self.node(Node::Mul(a.id, b.id), at)?, dim }))
             }
-            (Value::Scalar(s), Value::Vector { v, dim, .. }) | (Value::Vector { v, dim, .. }, Value::Scalar(s)) => {
+            (Value::Scalar(s), Value::Vector { v, dim, .. })
+            | (Value::Vector { v, dim, .. }, Value::Scalar(s)) => {
                 let dim = self.dimension(s.dim.times(dim), at)?;
                 let v = self.each(v, |me, id| me.node(Node::Mul(s.id, id), at))?;
                 Ok(Value::Vector { v, dim, literal: false })
             }
             (l, r) => {
-                let d = Diagnostic::error(
-                    codes::TYPE,
-                    format!("{} times {} has no meaning", l.a(), r.a()),
-                    at,
-                );
+                let d =
+                    Diagnostic::error(codes::TYPE, format!("{} times {} has no meaning", l.a(), r.a()), at);
                 let point = matches!(l, Value::Point(_)) || matches!(r, Value::Point(_));
                 self.fail(if point { d.help("scale a difference of points: `A + 2 * (B - A)`") } else { d })
             }
@@ -212,9 +215,13 @@ impl<'a> Evaluator<'a> {
             Some(n) if n.fract() == 0.0 && n.abs() <= MAX_POWER => n as i32,
             _ => {
                 return self.fail(
-                    Diagnostic::error(codes::EXPONENT, "the exponent must be a whole number written out", exponent.at)
-                        .label(format!("a literal from -{MAX_POWER} to {MAX_POWER}"))
-                        .help("for a root use `sqrt`"),
+                    Diagnostic::error(
+                        codes::EXPONENT,
+                        "the exponent must be a whole number written out",
+                        exponent.at,
+                    )
+                    .label(format!("a literal from -{MAX_POWER} to {MAX_POWER}"))
+                    .help("for a root use `sqrt`"),
                 );
             }
         };
@@ -223,7 +230,9 @@ impl<'a> Evaluator<'a> {
                 let dim = self.dimension(s.dim.power(n), at)?;
                 Ok(Value::Scalar(Scalar { id: self.node(Node::Powi(s.id, n), at)?, dim }))
             }
-            other => self.fail(Diagnostic::error(codes::TYPE, format!("{} has no powers", other.a()), base.at)),
+            other => {
+                self.fail(Diagnostic::error(codes::TYPE, format!("{} has no powers", other.a()), base.at))
+            }
         }
     }
 }

@@ -165,8 +165,11 @@ impl<'a> Evaluator<'a> {
             let symbol = &part.symbol.node;
             let Some(u) = units::find(symbol) else {
                 let near = super::names::suggestion(symbol, units::UNITS.iter().map(|u| u.symbol));
-                let mut d =
-                    Diagnostic::error(codes::UNKNOWN_UNIT, format!("unknown unit `{symbol}`"), part.symbol.at);
+                let mut d = Diagnostic::error(
+                    codes::UNKNOWN_UNIT,
+                    format!("unknown unit `{symbol}`"),
+                    part.symbol.at,
+                );
                 d = match near {
                     Some(n) => d.help(format!("did you mean `{n}`?")),
                     None => d.help(format!(
@@ -260,7 +263,9 @@ impl<'a> Evaluator<'a> {
 
     /// Forces a declared name; `asked_at` is where it is used.
     pub(super) fn force(&mut self, scope: usize, local: usize, asked_at: Origin) -> Outcome<Value> {
-        let Some(entry) = self.scopes.get(scope).and_then(|s| s.locals.get(local)) else { return Err(Failed) };
+        let Some(entry) = self.scopes.get(scope).and_then(|s| s.locals.get(local)) else {
+            return Err(Failed);
+        };
         match &entry.state {
             State::Done(v) => return Ok(v.clone()),
             State::Failed => return Err(Failed),
@@ -343,8 +348,9 @@ impl<'a> Evaluator<'a> {
         if std::mem::discriminant(v) == std::mem::discriminant(expected) {
             return Ok(());
         }
-        let d = Diagnostic::error(codes::TYPE, format!("{} is needed, this is {}", expected.a(), v.a()), e.at)
-            .also(default, "the default it replaces");
+        let d =
+            Diagnostic::error(codes::TYPE, format!("{} is needed, this is {}", expected.a(), v.a()), e.at)
+                .also(default, "the default it replaces");
         self.fail(d)
     }
 
@@ -375,8 +381,12 @@ impl<'a> Evaluator<'a> {
         if fits {
             return Ok(());
         }
-        let d = Diagnostic::error(codes::TYPE, format!("this is {}, not {}", v.a(), with_article(&ty.node)), e.at)
-            .also(ty.at, format!("declared as {} here", with_article(&ty.node)));
+        let d = Diagnostic::error(
+            codes::TYPE,
+            format!("this is {}, not {}", v.a(), with_article(&ty.node)),
+            e.at,
+        )
+        .also(ty.at, format!("declared as {} here", with_article(&ty.node)));
         self.fail(d)
     }
 
@@ -419,13 +429,25 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Evaluates to a scalar of dimension `want`.
-    pub(super) fn eval_scalar(&mut self, env: &Env, e: &'a Expr, want: Dimension, what: &str) -> Outcome<ExprId> {
+    pub(super) fn eval_scalar(
+        &mut self,
+        env: &Env,
+        e: &'a Expr,
+        want: Dimension,
+        what: &str,
+    ) -> Outcome<ExprId> {
         let v = self.eval(env, e)?;
         self.scalar(v, e, want, what)
     }
 
     /// Evaluates to a number that depends on nothing free.
-    pub(super) fn eval_fixed(&mut self, scope: usize, e: &'a Expr, want: Dimension, what: &str) -> Outcome<f64> {
+    pub(super) fn eval_fixed(
+        &mut self,
+        scope: usize,
+        e: &'a Expr,
+        want: Dimension,
+        what: &str,
+    ) -> Outcome<f64> {
         let id = self.eval_scalar(&Env::fixed(scope), e, want, what)?;
         self.fixed(id, e.at, what)
     }
@@ -465,7 +487,8 @@ impl<'a> Evaluator<'a> {
                     .help("write `(10 mm, 0 mm)`"),
             ),
             other => {
-                let mut d = Diagnostic::error(codes::TYPE, format!("a point is needed, this is {}", other.a()), e.at);
+                let mut d =
+                    Diagnostic::error(codes::TYPE, format!("a point is needed, this is {}", other.a()), e.at);
                 if matches!(other, Value::Vector { .. }) {
                     d = d.help("add it to a point: `O + …`");
                 }
@@ -660,8 +683,9 @@ impl<'a> Evaluator<'a> {
                 None => self.program.item(visible.item).map(|i| super::load::item_name(i).at),
             };
             let kind = self.program.item(visible.item).map_or("item", item_kind).to_string();
-            let mut d = Diagnostic::error(codes::SHADOWING, format!("`{name}` would hide the {kind} `{name}`"), at)
-                .help("choose another name: nothing shadows");
+            let mut d =
+                Diagnostic::error(codes::SHADOWING, format!("`{name}` would hide the {kind} `{name}`"), at)
+                    .help("choose another name: nothing shadows");
             if let Some(place) = place {
                 d = d.also(place, format!("the {kind} comes from here"));
             }

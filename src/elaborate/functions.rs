@@ -11,8 +11,8 @@ use crate::syntax::ast::{Argument, Expr, ExprKind, Ident};
 
 /// Functions that give a value.
 const FUNCTIONS: &[&str] = &[
-    "polar", "meet", "circle", "distance", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan2", "min", "max",
-    "abs",
+    "polar", "meet", "circle", "distance", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan2", "min",
+    "max", "abs",
 ];
 
 /// Functions that exist elsewhere: in objectives, requirements, templates and exports.
@@ -49,8 +49,12 @@ impl<'a> Evaluator<'a> {
                 }
                 let Some(dim) = s.dim.root() else {
                     return self.fail(
-                        Diagnostic::error(codes::ROOT, "this has no square root with a dimension of its own", e.at)
-                            .label(s.dim.to_string()),
+                        Diagnostic::error(
+                            codes::ROOT,
+                            "this has no square root with a dimension of its own",
+                            e.at,
+                        )
+                        .label(s.dim.to_string()),
                     );
                 };
                 Ok(Value::Scalar(Scalar { id: self.node(Node::Sqrt(s.id), at)?, dim }))
@@ -74,7 +78,10 @@ impl<'a> Evaluator<'a> {
             "atan2" => {
                 let [y, x] = self.fixed_arguments(f, args, ["y", "x"])?;
                 let (a, b) = self.like_scalars(env, y, x)?;
-                Ok(Value::Scalar(Scalar { id: self.node(Node::Atan2(a.id, b.id), at)?, dim: Dimension::ANGLE }))
+                Ok(Value::Scalar(Scalar {
+                    id: self.node(Node::Atan2(a.id, b.id), at)?,
+                    dim: Dimension::ANGLE,
+                }))
             }
             "min" | "max" => self.extremum(env, f, args, at),
             _ => self.unknown_function(f),
@@ -86,7 +93,8 @@ impl<'a> Evaluator<'a> {
         if LATER.contains(&name) {
             return self.later(codes::LATER_TERM, name, f.at);
         }
-        let mut d = Diagnostic::error(codes::UNKNOWN_FUNCTION, format!("there is no function `{name}` here"), f.at);
+        let mut d =
+            Diagnostic::error(codes::UNKNOWN_FUNCTION, format!("there is no function `{name}` here"), f.at);
         if let Some((_, text)) = ELSEWHERE.iter().find(|(n, _)| *n == name) {
             d = d.help(*text);
         } else if let Some(near) = super::names::suggestion(name, FUNCTIONS.iter().copied()) {
@@ -215,7 +223,8 @@ impl<'a> Evaluator<'a> {
 
     fn extremum(&mut self, env: &Env, f: &Ident, args: &'a [Argument], at: Origin) -> Outcome<Value> {
         if let Some(named) = args.iter().find_map(|a| a.name.as_ref()) {
-            let d = Diagnostic::error(codes::ARGUMENTS, format!("`{}` takes plain arguments", f.node), named.at);
+            let d =
+                Diagnostic::error(codes::ARGUMENTS, format!("`{}` takes plain arguments", f.node), named.at);
             return self.fail(d);
         }
         let Some((first, rest)) = args.split_first() else {
@@ -229,9 +238,13 @@ impl<'a> Evaluator<'a> {
         for a in rest {
             let next = self.any_scalar(env, &a.value)?;
             if next.dim != best.dim {
-                let d = Diagnostic::error(codes::DIMENSION, format!("{} against {}", best.dim, next.dim), a.value.at)
-                    .label(next.dim.to_string())
-                    .also(first.value.at, best.dim.to_string());
+                let d = Diagnostic::error(
+                    codes::DIMENSION,
+                    format!("{} against {}", best.dim, next.dim),
+                    a.value.at,
+                )
+                .label(next.dim.to_string())
+                .also(first.value.at, best.dim.to_string());
                 return self.fail(d);
             }
             let node =
@@ -372,7 +385,12 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Says by how much two circles miss each other, in mm.
-    fn check_meeting(&mut self, one: (ExprPoint, ExprId), two: (ExprPoint, ExprId), at: Origin) -> Outcome<()> {
+    fn check_meeting(
+        &mut self,
+        one: (ExprPoint, ExprId),
+        two: (ExprPoint, ExprId),
+        at: Origin,
+    ) -> Outcome<()> {
         let v = |id| self.start_value(id);
         let (r, s) = (v(one.1), v(two.1));
         let d = (v(two.0[0]) - v(one.0[0])).hypot(v(two.0[1]) - v(one.0[1]));

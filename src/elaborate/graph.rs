@@ -52,7 +52,7 @@ fn with_operands(node: &Node, f: impl Fn(ExprId) -> ExprId) -> Node {
 /// Marks every node that `roots` depend on. Operands stand earlier, so one pass backwards is enough.
 fn reachable(graph: &ExprGraph, roots: &[ExprId]) -> Vec<bool> {
     let mut seen = vec![false; graph.nodes.len()];
-    let mut mark = |seen: &mut Vec<bool>, id: ExprId| {
+    let mark = |seen: &mut Vec<bool>, id: ExprId| {
         if let Some(s) = seen.get_mut(id.0 as usize) {
             *s = true;
         }

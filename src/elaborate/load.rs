@@ -265,10 +265,14 @@ impl Loader<'_> {
                             }
                         };
                         self.out.push(
-                            Diagnostic::error(codes::DUPLICATE, format!("`{name}` comes from two places"), item.at)
-                                .label(format!("imports `{name}`"))
-                                .also(place, text)
-                                .also(declared, "the imported declaration"),
+                            Diagnostic::error(
+                                codes::DUPLICATE,
+                                format!("`{name}` comes from two places"),
+                                item.at,
+                            )
+                            .label(format!("imports `{name}`"))
+                            .also(place, text)
+                            .also(declared, "the imported declaration"),
                         );
                     }
                     None => {
@@ -296,8 +300,12 @@ impl Loader<'_> {
                 let head = segments.first().map_or("", |s| s.node.as_str());
                 let Some(last) = rest.last().filter(|_| head == "std") else {
                     return Err(Box::new(
-                        Diagnostic::error(codes::IMPORT_UNKNOWN, "imports start with `std.` or name a file", at)
-                            .help("write `use std.materials.rigur` or `use \"file.mech\"`"),
+                        Diagnostic::error(
+                            codes::IMPORT_UNKNOWN,
+                            "imports start with `std.` or name a file",
+                            at,
+                        )
+                        .help("write `use std.materials.rigur` or `use \"file.mech\"`"),
                     ));
                 };
                 Ok((Key::Std(format!("{}.mech", rest.join("/"))), Some((*last).to_string())))
@@ -308,7 +316,9 @@ impl Loader<'_> {
                     return Err(Box::new(refused(p, path.at, why)));
                 }
                 match from {
-                    Key::Std(_) => Err(Box::new(refused(p, path.at, "the standard library imports only `std.`"))),
+                    Key::Std(_) => {
+                        Err(Box::new(refused(p, path.at, "the standard library imports only `std.`")))
+                    }
                     Key::File(f) => {
                         let joined = match f.rsplit_once('/') {
                             Some((folder, _)) if self.chain.len() > 1 => format!("{folder}/{p}"),

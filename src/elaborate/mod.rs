@@ -1,1 +1,199 @@
-//! (being written)
+//! Elaboration: syntax trees to a [`Design`]. Imports, names, dimensions, evaluation, templates.
+//!
+//! Everything that can be wrong with a text is said here, with its place; the numerical stages see
+//! only the design. No I/O: files come in through [`Files`].
+
+mod arithmetic;
+pub mod codes;
+pub mod dimension;
+mod eval;
+mod functions;
+mod goals;
+mod graph;
+mod load;
+mod lookup;
+mod mechanism;
+mod names;
+mod records;
+mod scope;
+mod settings;
+mod sheet;
+mod structure;
+mod template;
+pub mod units;
+mod value;
+
+use crate::diagnostic::{Diagnostic, Origin, SourceMap};
+use crate::ir::Design;
+use crate::syntax::ast::Item;
+pub use load::std_modules;
+use settings::Settings;
+use std::fmt;
+
+/// Why a file could not be read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FileError {
+    /// It does not exist.
+    NotFound,
+    /// It lies outside the design's folder (through a link).
+    Outside,
+    /// It is not UTF-8 text.
+    NotText,
+    /// Anything else, in words.
+    Other(String),
+}
+
+impl fmt::Display for FileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            FileError::NotFound => f.write_str("the file does not exist"),
+            FileError::Outside => f.write_str("it leads out of the design's folder"),
+            FileError::NotText => f.write_str("it is not UTF-8 text"),
+            FileError::Other(why) => f.write_str(why),
+        }
+    }
+}
+
+/// Where sources come from.
+pub trait Files {
+    /// The text of a file. `path` is relative to the root file's folder, uses `/`, and has no `.` or
+    /// `..` parts; an implementation on a file system must also refuse links that lead outside.
+    ///
+    /// # Errors
+    /// Why it could not be read.
+    fn read(&self, path: &str) -> Result<String, FileError>;
+}
+
+/// Files held in memory: pairs of path and text.
+impl Files for std::collections::BTreeMap<String, String> {
+    fn read(&self, path: &str) -> Result<String, FileError> {
+        self.get(path).cloned().ok_or(FileError::NotFound)
+    }
+}
+
+/// What the caller may change about a design.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// `--set name=value`: parameters of the mechanism (`r`), of a template (`knee.thickness`) or free
+    /// values inside one (`knee.upper.from.at.r`).
+    pub set: Vec<(String, String)>,
+    /// `--steps`: number of steps in place of the text's.
+    pub steps: Option<usize>,
+}
+
+/// What [`elaborate`] gives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Elaborated {
+    /// The design; none when there are errors.
+    pub design: Option<Design>,
+    /// Every text that was read: the root file first, then imports, then `--set` values.
+    pub sources: SourceMap,
+    /// Findings of parsing and elaboration, in the order of the files and places.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Reads `root` and what it imports, and elaborates it. The design is the *last* mechanism of the root
+/// file; the others are checked too.
+pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated {
+    let mut sources = SourceMap::default();
+    let mut diagnostics = Vec::new();
+    let program = load::load(root, files, &mut sources, &mut diagnostics);
+    let settings = Settings::parse(&options.set, &mut sources, &mut diagnostics);
+    let Some(module) = program.root.and_then(|i| Some((i, program.modules.get(i)?))) else {
+        return Elaborated { design: None, sources, diagnostics };
+    };
+    let (root_index, root_module) = module;
+    let mut evaluator = eval::Evaluator::new(&program, &settings);
+    let outside = mechanism::Outside { module: root_index, steps: options.steps, sources: &sources };
+    let mut mechanisms: Vec<_> = root_module
+        .file
+        .items
+        .iter()
+        .filter_map(|i| match i {
+            Item::Mechanism(m) => Some(m),
+            _ => None,
+        })
+        .collect();
+    let last = mechanisms.pop();
+    let no_settings = Settings::default();
+    for other in mechanisms {
+        let mut checker = eval::Evaluator::new(&program, &no_settings);
+        checker.mechanism(other, &outside);
+        evaluator.used.append(&mut checker.used);
+        diagnostics.append(&mut checker.out);
+    }
+    let mut design = None;
+    match last {
+        Some(m) => {
+            design = evaluator.mechanism(m, &outside);
+            evaluator.unused_settings();
+        }
+        None if !root_module.broken => diagnostics.push(
+            Diagnostic::error(
+                codes::NO_MECHANISM,
+                format!("`{root}` declares no mechanism"),
+                Origin { file: 0, start: 0, end: 0 },
+            )
+            .help("a design is a `mechanism NAME { … }`; materials and flexures alone are for importing"),
+        ),
+        None => {}
+    }
+    let used = std::mem::take(&mut evaluator.used);
+    diagnostics.append(&mut evaluator.out);
+    if !diagnostics.iter().any(Diagnostic::is_error) {
+        for (u, text) in root_module.file.uses.iter().enumerate() {
+            if root_module.imported.get(u) == Some(&true) && !used.contains(&(root_index, u)) {
+                diagnostics.push(
+                    Diagnostic::warning(codes::UNUSED_IMPORT, "this import is not used", text.at)
+                        .help("remove the line"),
+                );
+            }
+        }
+    } else {
+        design = None;
+    }
+    tidy(&mut diagnostics);
+    Elaborated { design, sources, diagnostics }
+}
+
+/// Sorts by place and drops repetitions: a template used twice says a thing once.
+fn tidy(diagnostics: &mut Vec<Diagnostic>) {
+    let place =
+        |d: &Diagnostic| d.labels.first().map(|l| (l.at.file, l.at.start, l.at.end)).unwrap_or_default();
+    diagnostics.sort_by(|a, b| place(a).cmp(&place(b)).then_with(|| a.code.cmp(&b.code)));
+    let mut kept: Vec<Diagnostic> = Vec::with_capacity(diagnostics.len());
+    for d in diagnostics.drain(..) {
+        if !kept
+            .iter()
+            .rev()
+            .take_while(|k| place(k) == place(&d))
+            .any(|k| k.code == d.code && k.message == d.message)
+        {
+            kept.push(d);
+        }
+    }
+    *diagnostics = kept;
+}
+
+impl eval::Evaluator<'_> {
+    /// Reports `--set` of names that nothing looked for.
+    fn unused_settings(&mut self) {
+        for (i, s) in self.settings.0.iter().enumerate() {
+            if self.set_used.contains(&i) {
+                continue;
+            }
+            let d = Diagnostic::error(
+                codes::SET_UNKNOWN,
+                format!("there is nothing to set by the name `{}`", s.path),
+                s.at,
+            );
+            let near = names::suggestion(&s.path, self.settable.iter().map(String::as_str));
+            self.out.push(match near {
+                Some(n) => d.help(format!("did you mean `{n}`?")),
+                None => d.help(
+                    "parameters of the mechanism (`r`) and of its flexures (`knee.thickness`) can be set",
+                ),
+            });
+        }
+    }
+}

@@ -78,8 +78,12 @@ impl<'a> Evaluator<'a> {
         let owner = &record.name.node;
         let d = if known.iter().any(|f| f.name == name.node) {
             let stated: Vec<&str> = record.fields.iter().map(|(n, _)| n.node.as_str()).collect();
-            Diagnostic::error(codes::UNKNOWN_FIELD, format!("`{owner}` does not state `{}`", name.node), name.at)
-                .also(record.name.at, format!("this {kind} states {}", stated.join(", ")))
+            Diagnostic::error(
+                codes::UNKNOWN_FIELD,
+                format!("`{owner}` does not state `{}`", name.node),
+                name.at,
+            )
+            .also(record.name.at, format!("this {kind} states {}", stated.join(", ")))
         } else {
             let d = Diagnostic::error(
                 codes::UNKNOWN_FIELD,
@@ -183,7 +187,9 @@ impl<'a> Evaluator<'a> {
                         record.name.at,
                     )
                     .help(match f.holds {
-                        Holds::Quantity(d) => format!("add `{} = …`, {}", f.name, super::value::with_article(&d.to_string())),
+                        Holds::Quantity(d) => {
+                            format!("add `{} = …`, {}", f.name, super::value::with_article(&d.to_string()))
+                        }
                         Holds::Text => format!("add `{} = \"…\"`", f.name),
                     }),
                 );
@@ -275,10 +281,13 @@ impl<'a> Evaluator<'a> {
                 microsteps: self.whole_field(item, "microsteps", "a stepper")?,
             },
             "pwm" => MotorInterface::Pwm { range_rad: self.needed_field(item, "range", "a servo")? },
-            "dynamixel" => MotorInterface::Dynamixel { range_rad: self.needed_field(item, "range", "a servo")? },
+            "dynamixel" => {
+                MotorInterface::Dynamixel { range_rad: self.needed_field(item, "range", "a servo")? }
+            }
             other => {
-                let d = Diagnostic::error(codes::RECORD, format!("unknown interface `{other}`"), record.name.at)
-                    .help("interfaces are \"stepper\", \"pwm\", \"dynamixel\"");
+                let d =
+                    Diagnostic::error(codes::RECORD, format!("unknown interface `{other}`"), record.name.at)
+                        .help("interfaces are \"stepper\", \"pwm\", \"dynamixel\"");
                 return self.fail(d);
             }
         };
@@ -302,7 +311,11 @@ impl<'a> Evaluator<'a> {
         let v = self.needed_field(item, name, what)?;
         if v.fract() != 0.0 || v > 1e6 {
             let at = self.record(item).map(|r| r.name.at).unwrap_or_default();
-            return self.fail(Diagnostic::error(codes::COUNT, format!("`{name}` must be a whole number"), at));
+            return self.fail(Diagnostic::error(
+                codes::COUNT,
+                format!("`{name}` must be a whole number"),
+                at,
+            ));
         }
         Ok(v as u32)
     }

@@ -34,8 +34,12 @@ impl Settings {
                 Some(e) => Some(e),
                 None => {
                     out.push(
-                        Diagnostic::error(codes::SET_SYNTAX, format!("`{text}` is not a value for `{path}`"), at)
-                            .help("write for instance `--set r=25 mm`"),
+                        Diagnostic::error(
+                            codes::SET_SYNTAX,
+                            format!("`{text}` is not a value for `{path}`"),
+                            at,
+                        )
+                        .help("write for instance `--set r=25 mm`"),
                     );
                     None
                 }

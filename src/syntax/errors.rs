@@ -1,17 +1,41 @@
 //! What recovery took, as diagnostics: one for each mistake, at its own place.
+//!
+//! | code | says |
+//! | --- | --- |
+//! | E0001 | something else was expected here |
+//! | E0002 | no statement or declaration starts so |
+//! | E0003 | a `{` is never closed |
+//! | E0004 | a statement or `}` stands outside of any block |
+//! | E0005 | the file is too large |
+//! | E0006 | brackets are nested too deep |
+//! | E0007 | a number is too large |
+//! | E0008 | a clause is given twice |
+//! | E0009 | a statement stands in a block of the wrong sort |
+//! | E0010 | a character that the language does not have |
+//! | E0011 | the edition is given twice |
+//! | E0012 | a text is not closed on its line |
+//! | E0013 | an expression is too long |
+//! | E0014 | there are more errors than are shown |
 
 use super::grammar::{Failure, Wanted, why};
 use super::lower::Lower;
 use super::tree::{Kind, Node};
+use super::words::{ITEM_WORDS, STATEMENT_WORDS, form, nearest};
 use crate::diagnostic::{Diagnostic, Origin};
+
+/// Broken parts that are looked into; looking costs as much as parsing them once more.
+const MAX_ERRORS: usize = 100;
 
 /// State between neighbouring broken parts, so that one mistake is not told twice.
 #[derive(Default)]
 pub(super) struct Recovery {
-    /// Parentheses that the broken statement before left open.
+    /// Parentheses that the broken part before left open.
     open: usize,
-    /// Run of declarations outside of any block: first and last byte.
-    outside: Option<Origin>,
+    /// A declaration's head was broken, or something stood outside: what follows outside of any
+    /// block is a consequence.
+    outside: bool,
+    /// Broken parts so far.
+    count: usize,
 }
 
 impl Recovery {
@@ -19,51 +43,359 @@ impl Recovery {
     pub(super) fn reset(&mut self) {
         self.open = 0;
     }
+
+    /// A declaration could be read.
+    pub(super) fn declared(&mut self) {
+        self.open = 0;
+        self.outside = false;
+    }
 }
 
 impl Lower<'_> {
+    /// A broken statement of a block.
     pub(super) fn bad_statement(&mut self, node: &Node) {
-        self.broken(node, Wanted::Statement);
+        if self.continues(node, STATEMENT_WORDS) {
+            return;
+        }
+        let text = self.text(node);
+        let word = first_word(text);
+        if !STATEMENT_WORDS.contains(&word) && !looks_like_joint(text) && !self.odd_at(node.start as usize) {
+            return self.unknown(node, word, STATEMENT_WORDS, "statement");
+        }
+        self.explain(node, Wanted::Statement, word);
     }
 
+    /// A broken term of `minimize`.
     pub(super) fn bad_term(&mut self, node: &Node) {
-        self.broken(node, Wanted::Term);
+        if !self.continues(node, STATEMENT_WORDS) {
+            self.explain(node, Wanted::Term, "term");
+        }
     }
 
+    /// A broken field of a record.
     pub(super) fn bad_field(&mut self, node: &Node) {
-        self.broken(node, Wanted::Field);
+        if !self.continues(node, &[]) {
+            self.explain(node, Wanted::Field, "field");
+        }
     }
 
-    pub(super) fn bad_heading(&mut self, node: &Node) {
-        self.broken(node.first(Kind::BadHeading).unwrap_or(node), Wanted::Item);
+    /// A declaration whose head is broken while its block can be read. True if the block holds
+    /// statements worth reading.
+    pub(super) fn bad_heading(&mut self, node: &Node) -> bool {
+        self.recovery.declared();
+        let heading = node.first(Kind::BadHeading).unwrap_or(node);
+        let word = first_word(self.text(heading));
+        if ITEM_WORDS.contains(&word) {
+            self.explain(heading, Wanted::Item, word);
+            return matches!(word, "mechanism" | "flexure");
+        }
+        self.unknown(heading, word, ITEM_WORDS, "declaration");
+        matches!(nearest(word, ITEM_WORDS), Some("mechanism" | "flexure"))
     }
 
+    /// What stands outside of any block and is no declaration.
     pub(super) fn stray(&mut self, node: &Node) {
-        self.broken(node, Wanted::Item);
+        let text = self.text(node);
+        let word = first_word(text);
+        let is_item = ITEM_WORDS.contains(&word);
+        if !is_item && (self.recovery.outside || self.continues(node, ITEM_WORDS)) {
+            return;
+        }
+        self.recovery.outside = true;
+        if text == "}" {
+            let at = self.origin(node);
+            self.report(
+                Diagnostic::error("E0004", "this `}` closes nothing", at)
+                    .label("no `{` is open here")
+                    .help("remove it, or look for a `}` too many above"),
+            );
+        } else if is_item {
+            self.explain(node, Wanted::Item, word);
+        } else if STATEMENT_WORDS.contains(&word) {
+            let at = self.first_line(node);
+            self.report(
+                Diagnostic::error("E0004", format!("`{word}` stands outside of any block"), at)
+                    .label("no `mechanism` or `flexure` is open here")
+                    .help("statements stand between the `{` and `}` of a `mechanism` or `flexure`"),
+            );
+        } else if self.odd_at(node.start as usize) {
+            self.explain(node, Wanted::Item, word);
+        } else {
+            self.unknown(node, word, ITEM_WORDS, "declaration");
+        }
     }
 
+    /// A block whose `}` is missing.
+    pub(super) fn closed(&mut self, block: &Node) {
+        let Some(end) = block.first(Kind::NoBrace) else { return };
+        // A broken statement that opened a block of its own has taken this block's `}`.
+        if block.all(Kind::BadStatement).any(|n| self.text(n).contains('{')) {
+            return;
+        }
+        let open = block.all(Kind::Punctuation).find(|n| self.text(n) == "{").unwrap_or(block);
+        let open = self.origin(open);
+        let noticed = self.after_last_token(end.start as usize);
+        self.report(
+            Diagnostic::error("E0003", "this `{` is never closed", open)
+                .also(self.at(noticed, noticed), "a `}` is missing here at the latest")
+                .help("close the block with `}` on a line of its own"),
+        );
+    }
+
+    /// Ends the count of broken parts.
     pub(super) fn finish(&mut self) {
-        let _ = self.recovery.outside.take();
+        if self.recovery.count > MAX_ERRORS {
+            let message = format!("{} more errors are not shown", self.recovery.count - MAX_ERRORS);
+            let end = self.source.len();
+            self.report(Diagnostic::error("E0014", message, self.at(end, end)));
+        }
+        self.diagnostics.sort_by_key(|d| d.labels.first().map_or(0, |l| l.at.start));
     }
 
-    fn broken(&mut self, node: &Node, wanted: Wanted) {
+    /// Counts a broken part; false if enough have been told.
+    fn counted(&mut self) -> bool {
+        self.recovery.count += 1;
+        self.recovery.count <= MAX_ERRORS
+    }
+
+    /// Whether a broken part only continues parentheses that the one before left open.
+    fn continues(&mut self, node: &Node, keywords: &[&str]) -> bool {
+        let text = self.text(node);
+        let before = self.recovery.open;
+        let continues = before > 0 && !keywords.contains(&first_word(text));
+        self.recovery.open = if continues { before } else { 0 };
+        node.leaves(&mut |leaf| {
+            if leaf.kind == Kind::Junk {
+                for c in self.source.get(leaf.range()).unwrap_or("").chars() {
+                    match c {
+                        '(' => self.recovery.open += 1,
+                        ')' => self.recovery.open = self.recovery.open.saturating_sub(1),
+                        _ => {}
+                    }
+                }
+            }
+        });
+        continues
+    }
+
+    /// E0002.
+    fn unknown(&mut self, node: &Node, word: &str, known: &[&str], what: &str) {
+        if !self.counted() {
+            return;
+        }
+        let start = node.start as usize;
+        if word.is_empty() {
+            let (length, found) = found(self.source, start);
+            let message = format!("{} {what} starts with a keyword, found {found}", article(what));
+            let at = self.at(start, start + length);
+            let help = format!("{}s start with one of: {}", what, known.join(", "));
+            self.report(Diagnostic::error("E0002", message, at).label("no keyword").help(help));
+            return;
+        }
+        let at = self.at(start, start + word.len());
+        let diagnostic =
+            Diagnostic::error("E0002", format!("no {what} starts with `{word}`"), at).label("not a keyword");
+        let help = match nearest(word, known) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("{}s start with one of: {}", what, known.join(", ")),
+        };
+        self.report(diagnostic.help(help));
+    }
+
+    /// E0001, E0010 or E0012: where a part stopped making sense, and what would have.
+    fn explain(&mut self, node: &Node, wanted: Wanted, word: &str) {
+        if !self.counted() {
+            return;
+        }
         let start = node.start as usize;
         let Some(Failure { at, expected }) = why(self.source, start, wanted) else {
-            let at = self.origin(node);
+            let at = self.first_line(node);
             self.report(Diagnostic::error("E0001", "this could not be read", at));
             return;
         };
-        let at = self.at(at, at);
-        self.report(Diagnostic::error("E0001", format!("expected {}", expected.join(", ")), at));
-    }
-
-    /// Reports a block whose `}` is missing.
-    pub(super) fn closed(&mut self, block: &Node) {
-        if block.first(Kind::NoBrace).is_none() {
+        let at = self.settle(at);
+        let (length, found) = found(self.source, at);
+        let place = self.at(at, at + length);
+        let rest = self.source.get(at..).unwrap_or("");
+        if rest.starts_with('"') && expected.iter().all(|e| !e.contains("quotes") || unclosed(rest)) {
+            let line = rest.lines().next().map_or(0, |l| l.trim_end().len());
+            if unclosed(rest) {
+                self.report(
+                    Diagnostic::error("E0012", "this text is not closed", self.at(at, at + line))
+                        .label("no `\"` follows on this line")
+                        .help("close it with `\"` on the same line"),
+                );
+                return;
+            }
+        }
+        if let Some((message, help)) = odd(rest) {
+            self.report(Diagnostic::error("E0010", message, place).label("not understood").help(help));
             return;
         }
-        let open = block.first(Kind::Punctuation).unwrap_or(block);
-        let at = self.origin(open);
-        self.report(Diagnostic::error("E0003", "this `{` is never closed", at));
+        let expected = list(&expected);
+        let mut diagnostic = Diagnostic::error("E0001", format!("expected {expected}, found {found}"), place)
+            .label(format!("expected {expected}"));
+        if let Some(help) = self.advice(at, word) {
+            diagnostic = diagnostic.help(help);
+        }
+        self.report(diagnostic);
     }
+
+    /// What to do about an error at `at` in a statement that starts with `word`.
+    fn advice(&self, at: usize, word: &str) -> Option<String> {
+        let rest = self.source.get(at..).unwrap_or("");
+        let before = self.source.get(..at).unwrap_or("");
+        let after_value = before.trim_end_matches([' ', '\t']);
+        if rest.starts_with('(') && after_value.ends_with(|c: char| c.is_ascii_alphanumeric() || c == ')') {
+            return Some("write `*` between factors; a call has no space before its `(`".into());
+        }
+        if rest.starts_with("==") || rest.starts_with("=") && word == "require" {
+            return Some("compare with `<=`, `<`, `>=` or `>`".into());
+        }
+        form(word).map(|form| format!("write `{form}`"))
+    }
+
+    /// Moves a failure back to the end of the line whose continuation was looked for in vain on
+    /// the lines after it.
+    fn settle(&self, at: usize) -> usize {
+        let end = self.after_last_token(at);
+        let crossed = self.source.get(end..at).is_some_and(|t| t.contains(['\n', '\r']));
+        if !crossed {
+            return at;
+        }
+        // After these the next line is a continuation: the mistake is there.
+        let open =
+            self.source.get(..end).is_some_and(|t| t.ends_with([',', '(', '{', '+', '-', '*', '/', '^']));
+        let word_follows = self.source.get(at..).is_some_and(|t| !t.is_empty() && !t.starts_with('}'));
+        if open && word_follows && !STATEMENT_WORDS.contains(&first_word(self.source.get(at..).unwrap_or("")))
+        {
+            at
+        } else {
+            end
+        }
+    }
+
+    /// End of the last byte before `at` that is no trivia.
+    fn after_last_token(&self, at: usize) -> usize {
+        let mut end = at;
+        loop {
+            let before = self.source.get(..end).unwrap_or("");
+            let trimmed = before.trim_end_matches([' ', '\t', '\n', '\r']).len();
+            let line = self.source.get(..trimmed).and_then(|t| t.rfind(['\n', '\r'])).map_or(0, |i| i + 1);
+            let comment = self.source.get(line..trimmed).and_then(comment_start);
+            match comment {
+                Some(start) => end = line + start,
+                None => return trimmed,
+            }
+        }
+    }
+
+    /// The first line of a node.
+    fn first_line(&self, node: &Node) -> Origin {
+        let length = self.text(node).lines().next().map_or(0, |l| l.trim_end().len());
+        self.at(node.start as usize, node.start as usize + length)
+    }
+
+    fn odd_at(&self, at: usize) -> bool {
+        odd(self.source.get(at..).unwrap_or("")).is_some()
+    }
+}
+
+/// Byte offset of the comment on a line, if any.
+fn comment_start(line: &str) -> Option<usize> {
+    let mut quoted = false;
+    let mut last = ' ';
+    for (at, c) in line.char_indices() {
+        if c == '"' {
+            quoted = !quoted;
+        }
+        if c == '/' && last == '/' && !quoted {
+            return Some(at - 1);
+        }
+        last = c;
+    }
+    None
+}
+
+/// The word a text starts with; empty if it starts with something else.
+fn first_word(text: &str) -> &str {
+    let end = text.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(text.len());
+    let word = text.get(..end).unwrap_or("");
+    if word.starts_with(|c: char| c.is_ascii_digit()) { "" } else { word }
+}
+
+/// `KIND NAME:`, whatever the kind.
+fn looks_like_joint(text: &str) -> bool {
+    let rest = text.get(first_word(text).len()..).unwrap_or("").trim_start_matches([' ', '\t']);
+    let name = first_word(rest);
+    let rest = rest.get(name.len()..).unwrap_or("").trim_start_matches([' ', '\t']);
+    !name.is_empty() && rest.starts_with(':')
+}
+
+fn unclosed(text: &str) -> bool {
+    let line = text.lines().next().unwrap_or("");
+    line.matches('"').count() < 2
+}
+
+/// Message and help for a character that the language does not have, with what was meant.
+fn odd(rest: &str) -> Option<(String, String)> {
+    let c = rest.chars().next()?;
+    if c.is_ascii_graphic() && !"`'@#$&|;?\\~!".contains(c) || " \t\n\r".contains(c) {
+        return None;
+    }
+    let meant = match c {
+        '\u{2212}' | '–' | '—' => "write `-` for minus",
+        '×' | '·' | '⋅' => "write `*` for a product",
+        '÷' => "write `/` for a quotient",
+        '≤' => "write `<=`",
+        '≥' => "write `>=`",
+        '²' => "write `^2`",
+        '³' => "write `^3`",
+        '“' | '”' | '„' | '«' | '»' | '\'' | '‘' | '’' => {
+            "texts stand in straight double quotes: `\"…\"`"
+        }
+        '…' => "write `..` for a range",
+        ';' => "one declaration a line: remove it, the line end suffices",
+        '#' => "comments start with `//`",
+        '\u{A0}' | '\u{2007}' | '\u{202F}' => "replace it by an ordinary space",
+        c if c.is_alphabetic() => "names are made of `a`–`z`, `A`–`Z`, `0`–`9` and `_`",
+        c if c.is_control() => "the file may not be text, or not in UTF-8",
+        _ => "remove it; it may stand in comments and texts only",
+    };
+    let (_, shown) = found(rest, 0);
+    Some((format!("{shown} has no meaning here"), meant.into()))
+}
+
+/// Length and description of what stands at a place.
+fn found(source: &str, at: usize) -> (usize, String) {
+    let rest = source.get(at..).unwrap_or("");
+    let Some(c) = rest.chars().next() else { return (0, "the end of the file".into()) };
+    let run = |f: &dyn Fn(char) -> bool| rest.find(|c| !f(c)).unwrap_or(rest.len());
+    if rest.trim_start_matches([' ', '\t']).starts_with("//") || "\n\r \t".contains(c) {
+        return (0, "the end of the line".into());
+    }
+    let length = match c {
+        c if c.is_ascii_digit() => run(&|c| c.is_ascii_alphanumeric() || c == '.'),
+        c if c.is_alphanumeric() || c == '_' => run(&|c| c.is_alphanumeric() || c == '_'),
+        '<' | '>' | '=' => run(&|c| "<>=".contains(c)),
+        _ => c.len_utf8(),
+    };
+    if c.is_control() || c.is_whitespace() || c == '\u{FEFF}' {
+        return (length, format!("the character U+{:04X}", c as u32));
+    }
+    // A long run is named by its beginning.
+    let text: String = rest.get(..length).unwrap_or("").chars().take(40).collect();
+    (length, format!("`{text}`"))
+}
+
+fn list(items: &[String]) -> String {
+    match items {
+        [] => "something else".into(),
+        [only] => only.clone(),
+        [first @ .., last] => format!("{} or {last}", first.join(", ")),
+    }
+}
+
+fn article(noun: &str) -> &'static str {
+    if noun.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" }
 }

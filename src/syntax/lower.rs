@@ -72,6 +72,9 @@ impl<'a> Lower<'a> {
                 continue;
             }
             let doc = doc.take();
+            if !matches!(node.kind, Kind::BadHeader | Kind::Stray) {
+                self.recovery.declared();
+            }
             match node.kind {
                 Kind::Edition => self.edition(node, &mut file),
                 Kind::Import => file.uses.extend(self.import(node)),
@@ -79,8 +82,9 @@ impl<'a> Lower<'a> {
                 Kind::Flexure => file.items.extend(self.flexure(node, doc)),
                 Kind::Record => file.items.extend(self.record(node, doc)),
                 Kind::BadHeader => {
-                    self.bad_heading(node);
-                    self.statements(node);
+                    if self.bad_heading(node) {
+                        self.statements(node);
+                    }
                 }
                 Kind::Stray => self.stray(node),
                 _ => {}

@@ -7,12 +7,14 @@ pub mod ast;
 mod errors;
 mod expression;
 mod grammar;
+pub mod limits;
 mod lower;
 mod statement;
 pub mod tree;
+mod words;
 
-use crate::diagnostic::Diagnostic;
-use tree::Node;
+use crate::diagnostic::{Diagnostic, Origin};
+use tree::{Kind, Node};
 
 /// What [`parse`] gives.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,10 +29,28 @@ pub struct Parse {
 
 /// Parses the text of a `.mech` file; `file` is its index in the source map.
 pub fn parse(file: u32, text: &str) -> Parse {
-    let tree = match grammar::tree(text) {
-        Some(tree) => tree,
-        None => Node { kind: tree::Kind::File, start: 0, end: text.len() as u32, children: Vec::new() },
-    };
-    let (ast, diagnostics) = lower::lower(&tree, text, file);
-    Parse { tree, file: ast, diagnostics }
+    if let Some(diagnostic) = limits::check(file, text) {
+        return unread(text, diagnostic);
+    }
+    match grammar::tree(text) {
+        Some(tree) => {
+            let (ast, diagnostics) = lower::lower(&tree, text, file);
+            Parse { tree, file: ast, diagnostics }
+        }
+        // The grammar accepts every text; it gives up only where the thread's stack is too small.
+        None => {
+            let at = Origin { file, start: 0, end: 0 };
+            let message = "this file could not be read: its nesting needs more stack than there is";
+            unread(text, Diagnostic::error("E0006", message, at))
+        }
+    }
+}
+
+/// A tree of one leaf, for text that the grammar is not given.
+fn unread(text: &str, diagnostic: Diagnostic) -> Parse {
+    // Offsets are 32 bits wide: of a larger text the tree holds what it can count.
+    let end = u32::try_from(text.len()).unwrap_or(u32::MAX);
+    let leaf = Node { kind: Kind::Junk, start: 0, end, children: Vec::new() };
+    let tree = Node { kind: Kind::File, start: 0, end, children: vec![leaf] };
+    Parse { tree, file: ast::File::default(), diagnostics: vec![diagnostic] }
 }

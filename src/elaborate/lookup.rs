@@ -1,0 +1,105 @@
+//! What to say when a name is not found: near misses, private names, imports that would help.
+
+use super::codes;
+use super::eval::{Evaluator, Outcome};
+use super::load::{item_name, std_modules};
+use super::names::suggestion;
+use super::scope::LocalKind;
+use crate::diagnostic::{Diagnostic, Origin};
+use crate::syntax::ast::Ident;
+use std::collections::BTreeMap;
+
+impl<'a> Evaluator<'a> {
+    /// A name that should be a value.
+    pub(super) fn unknown_name<T>(&mut self, scope: usize, name: &Ident) -> Outcome<T> {
+        let Some(s) = self.scopes.get(scope) else { return Err(super::eval::Failed) };
+        let mut candidates: Vec<String> = s
+            .locals
+            .iter()
+            .filter(|l| !matches!(l.kind, LocalKind::Thing(_)))
+            .map(|l| l.name.clone())
+            .collect();
+        if let Some(m) = self.program.modules.get(s.module) {
+            candidates.extend(m.names.keys().cloned());
+        }
+        let d = Diagnostic::error(codes::UNKNOWN_NAME, format!("`{}` is not declared", name.node), name.at);
+        self.finish_unknown(d, name, &candidates)
+    }
+
+    /// A name that should be an item of a kind (`material`, `flexure`, …).
+    pub(super) fn unknown_item<T>(&mut self, scope: usize, name: &Ident, kind: &str) -> Outcome<T> {
+        let module = self.scopes.get(scope).map_or(0, |s| s.module);
+        let candidates: Vec<String> =
+            self.program.modules.get(module).map(|m| m.names.keys().cloned().collect()).unwrap_or_default();
+        let d = Diagnostic::error(
+            codes::UNKNOWN_NAME,
+            format!("there is no {kind} `{}` here", name.node),
+            name.at,
+        );
+        self.finish_unknown(d, name, &candidates)
+    }
+
+    fn finish_unknown<T>(&mut self, d: Diagnostic, name: &Ident, candidates: &[String]) -> Outcome<T> {
+        if name.node.starts_with('_')
+            && let Some((place, path)) = self.private(name)
+        {
+            return self.fail(
+                Diagnostic::error(codes::PRIVATE, format!("`{}` is private to `{path}`", name.node), name.at)
+                    .also(place, "declared here")
+                    .help("a leading `_` keeps a name in its file"),
+            );
+        }
+        let in_std = std_modules().into_iter().find(|m| m.rsplit('.').next() == Some(name.node.as_str()));
+        let d = match in_std {
+            Some(module) => d.help(format!("add `use std.{module}` at the top of the file")),
+            None => match suggestion(&name.node, candidates.iter().map(String::as_str)) {
+                Some(near) => d.help(format!("did you mean `{near}`?")),
+                None => d.label("not found here"),
+            },
+        };
+        self.fail(d)
+    }
+
+    fn private(&self, name: &Ident) -> Option<(Origin, String)> {
+        self.program.modules.iter().find_map(|m| {
+            let item = m.file.items.iter().find(|i| item_name(i).node == name.node)?;
+            Some((item_name(item).at, m.path.clone()))
+        })
+    }
+
+    /// The index of a body, joint or trace by name.
+    pub(super) fn thing(
+        &mut self,
+        scope: usize,
+        map: &BTreeMap<String, usize>,
+        name: &Ident,
+        kind: &str,
+    ) -> Outcome<usize> {
+        if let Some(i) = map.get(&name.node) {
+            return Ok(*i);
+        }
+        let local = self.scopes.get(scope).and_then(|s| s.locals.get(*s.index.get(&name.node)?));
+        if let Some(local) = local {
+            // A body or joint whose own declaration failed has been reported already.
+            let is = match &local.kind {
+                LocalKind::Thing(k) if *k == kind => return Err(super::eval::Failed),
+                LocalKind::Thing(k) => (*k).to_string(),
+                LocalKind::Value { point: true, .. } => "point".into(),
+                _ => "value".into(),
+            };
+            return self.wrong_kind(name, &is, &super::value::with_article(kind));
+        }
+        let d =
+            Diagnostic::error(codes::UNKNOWN_NAME, format!("there is no {kind} `{}`", name.node), name.at);
+        let d = match suggestion(&name.node, map.keys().map(String::as_str)) {
+            Some(near) => d.help(format!("did you mean `{near}`?")),
+            None if map.is_empty() => d.help(format!("the mechanism has no {kind}")),
+            None => d.help(format!(
+                "there {}: {}",
+                if map.len() == 1 { "is" } else { "are" },
+                map.keys().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", ")
+            )),
+        };
+        self.fail(d)
+    }
+}

@@ -1,0 +1,286 @@
+//! One mechanism from its statements to a [`Design`].
+
+use super::codes;
+use super::eval::Evaluator;
+use super::graph;
+use super::sheet::Sheet;
+use super::structure::Structure;
+use super::template::Site;
+use super::value::ItemRef;
+use crate::diagnostic::{Diagnostic, Origin, SourceMap};
+use crate::ir::expr::ExprId;
+use crate::ir::{Design, Drive, ExprPoint, Process, Realization, Rod, Section};
+use crate::syntax::ast::Mechanism;
+use std::collections::BTreeMap;
+
+/// What is told to a mechanism from outside.
+pub struct Outside<'s> {
+    /// Module it stands in.
+    pub module: usize,
+    /// `--steps`.
+    pub steps: Option<usize>,
+    /// Texts, to quote lines.
+    pub sources: &'s SourceMap,
+}
+
+impl<'a> Evaluator<'a> {
+    /// Elaborates a mechanism; none when it has errors.
+    pub(super) fn mechanism(&mut self, m: &'a Mechanism, outside: &Outside<'_>) -> Option<Design> {
+        let module = outside.module;
+        let scope = self.scope(module);
+        let mut sheet = self.sheet(scope, m);
+        sheet.broken |= self.program.modules.get(module).is_some_and(|m| m.broken);
+        for i in 0..self.scopes.get(scope).map_or(0, |s| s.locals.len()) {
+            let local = self.scopes.get(scope).and_then(|s| s.locals.get(i));
+            let Some(at) =
+                local.filter(|l| !matches!(l.kind, super::scope::LocalKind::Thing(_))).map(|l| l.at)
+            else {
+                continue;
+            };
+            // Errors have been reported; the rest of the mechanism is looked at all the same.
+            let _ = self.force(scope, i, at);
+        }
+        let material = match sheet.material {
+            Some((name, _)) => {
+                self.record_named(module, name, "material").and_then(|item| self.material(item)).ok()
+            }
+            None => self.missing(&sheet, m, "material", "`material rigur`"),
+        };
+        let process: Option<(ItemRef, Process)> = match sheet.process {
+            Some((name, _)) => self
+                .record_named(module, name, "process")
+                .and_then(|item| Ok((item, self.process(item)?)))
+                .ok(),
+            None => self.missing(&sheet, m, "process", "`print on polyjet`"),
+        };
+        let mut s = self.structure(scope, &sheet, m.name.at);
+        let clearance = process.as_ref().map(|(_, p)| p.clearance_mm);
+        let layers = self.layers(scope, &sheet, &s, clearance).ok();
+        let mut rods = Vec::new();
+        if let (Some((item, _)), Some(layers)) = (&process, &layers) {
+            self.flexures(scope, module, &mut s, *item, layers.height_mm, &mut rods);
+        }
+        let cycle = match sheet.cycle {
+            Some(_) => self.cycle(scope, &sheet, outside.steps).ok(),
+            None => self.missing(&sheet, m, "cycle", "`cycle 60 steps over 2 s`"),
+        };
+        if sheet.drives.is_empty() {
+            let _: Option<()> = self.missing(&sheet, m, "drive", "`drive J from 0 deg to 360 deg`");
+        }
+        let drives = self.drives(scope, module, &sheet, &s).ok();
+        let mut traces = Vec::new();
+        let mut trace_index = BTreeMap::new();
+        for text in &sheet.traces {
+            if let Ok(t) = self.trace(scope, text, &s) {
+                trace_index.insert(t.name.clone(), traces.len());
+                traces.push(t);
+            }
+        }
+        let mut objectives = Vec::new();
+        for term in sheet.minimize.map(|(terms, _)| terms).unwrap_or_default() {
+            objectives.extend(self.objective(scope, term, &trace_index));
+        }
+        let driven = drive_names(&drives, &sheet);
+        let mut requirements = Vec::new();
+        for text in &sheet.requires {
+            let line = quote(outside.sources, text.at);
+            requirements.extend(self.requirement(scope, text, &trace_index, &driven, &line));
+        }
+        let mut exports = Vec::new();
+        for e in &sheet.exports {
+            exports.extend(self.export(scope, e, &driven, drives.as_deref().unwrap_or_default()));
+        }
+        let geometry = geometry_of(&s, &traces);
+        self.check_fixed_geometry(&geometry);
+        if self.out.iter().any(Diagnostic::is_error) {
+            return None;
+        }
+        let mut design = Design {
+            name: m.name.node.clone(),
+            exprs: Default::default(),
+            free: std::mem::take(&mut self.free),
+            bodies: s.bodies,
+            joints: s.joints,
+            rods,
+            drives: drives?,
+            cycle: cycle?,
+            traces,
+            objectives,
+            requirements,
+            material: material?,
+            process: process?.1,
+            layers: layers?,
+            exports,
+            origin: m.at,
+        };
+        self.finish(&mut design)?;
+        Some(design)
+    }
+
+    /// Reports a statement that every mechanism needs.
+    fn missing<T>(&mut self, sheet: &Sheet<'a>, m: &Mechanism, what: &str, example: &str) -> Option<T> {
+        if !sheet.broken {
+            self.out.push(
+                Diagnostic::error(
+                    codes::MISSING,
+                    format!("mechanism `{}` has no {what}", m.name.node),
+                    m.name.at,
+                )
+                .help(format!("add for instance {example}")),
+            );
+        }
+        None
+    }
+
+    fn flexures(
+        &mut self,
+        scope: usize,
+        module: usize,
+        s: &mut Structure<'a>,
+        process: ItemRef,
+        layer_height_mm: f64,
+        rods: &mut Vec<Rod>,
+    ) {
+        for i in 0..s.joints.len() {
+            let (Some(text), Some(shorter_link_mm)) = (s.texts.get(i).copied(), self.shorter_link(s, i))
+            else {
+                continue;
+            };
+            let Some(template) = &text.template else { continue };
+            let Some(joint) = s.joints.get(i) else { continue };
+            let bodies = joint.bodies.clone();
+            let site = Site {
+                joint_name: &text.name.node,
+                joint: i,
+                bodies: &bodies,
+                kind: &text.kind.node,
+                shorter_link_mm,
+                layer_height_mm,
+                process,
+            };
+            if let Ok(made) = self.template(scope, module, template, &site, rods)
+                && let Some(joint) = s.joints.get_mut(i)
+            {
+                joint.realization =
+                    Realization::Compliant { template: template.name.node.clone(), rods: made };
+            }
+        }
+    }
+
+    /// The numerical stages differentiate flexures only: points must not be free for now.
+    fn check_fixed_geometry(&mut self, geometry: &[(ExprPoint, Origin)]) {
+        let mut reported = std::collections::BTreeSet::new();
+        for (p, place) in geometry {
+            for i in graph::free_variables(&self.exprs, p) {
+                if reported.insert(i)
+                    && let Some(f) = self.free.get(i)
+                {
+                    let d = Diagnostic::error(
+                        codes::LATER_FREE,
+                        "a free value that moves points of the mechanism is not available yet",
+                        f.origin,
+                    )
+                    .label(format!("`{}` is free", f.path))
+                    .also(*place, "this depends on it")
+                    .help("write a number here; values inside flexures can be free");
+                    self.out.push(d);
+                }
+            }
+        }
+    }
+
+    /// Drops what the design does not use from the graph, and checks what is left at the start values.
+    fn finish(&mut self, design: &mut Design) -> Option<()> {
+        let mut roots = Vec::new();
+        each_expr(design, &mut |id| roots.push(*id));
+        let (exprs, place) = graph::prune(&self.exprs, &roots);
+        let used = graph::free_variables(&self.exprs, &roots);
+        for (i, f) in design.free.iter().enumerate() {
+            if !used.contains(&i) {
+                self.out.push(
+                    Diagnostic::warning(
+                        codes::IDLE_FREE,
+                        format!("nothing depends on `{}`", f.path),
+                        f.origin,
+                    )
+                    .help("remove `free`, or use the value"),
+                );
+            }
+        }
+        design.exprs = exprs;
+        each_expr(design, &mut |id| {
+            if let Some(Some(moved)) = place.get(id.0 as usize) {
+                *id = *moved;
+            }
+        });
+        let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
+        let values = design.exprs.values(&start);
+        for rod in &design.rods {
+            let Section::Ellipse { a, b } = rod.section;
+            let ids = [rod.from.position, rod.from.derivative, rod.to.position, rod.to.derivative];
+            let finite = |id: &ExprId| values.get(id.0 as usize).is_some_and(|v| v.is_finite());
+            if !(ids.iter().flatten().all(finite) && finite(&a) && finite(&b)) {
+                self.out.push(
+                    Diagnostic::error(
+                        codes::NOT_FINITE,
+                        format!("rod `{}` is not finite at the start values", rod.path),
+                        rod.origin,
+                    )
+                    .label("a division by zero, or a root of a negative number"),
+                );
+            }
+        }
+        (!self.out.iter().any(Diagnostic::is_error)).then_some(())
+    }
+}
+
+/// Indices of the drives by name; wrong drives keep their place so that what names them is not reported too.
+fn drive_names(drives: &Option<Vec<Drive>>, sheet: &Sheet<'_>) -> BTreeMap<String, usize> {
+    match drives {
+        Some(d) => d.iter().enumerate().map(|(i, d)| (d.name.clone(), i)).collect(),
+        None => sheet.drives.iter().enumerate().map(|(i, d)| (d.joint.node.clone(), i)).collect(),
+    }
+}
+
+fn quote(sources: &SourceMap, at: Origin) -> String {
+    let text =
+        sources.files.get(at.file as usize).and_then(|f| f.text.get(at.start as usize..at.end as usize));
+    text.unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Every point that the conventional mechanism is made of.
+fn geometry_of(s: &Structure<'_>, traces: &[crate::ir::Trace]) -> Vec<(ExprPoint, Origin)> {
+    let mut out = Vec::new();
+    for j in &s.joints {
+        out.push((j.point, j.origin));
+        out.extend(j.toward.iter().map(|(_, p)| (*p, j.origin)));
+    }
+    for b in &s.bodies {
+        out.extend(b.skeleton.iter().map(|p| (p.position, b.origin)));
+    }
+    out.extend(traces.iter().map(|t| (t.point, t.origin)));
+    out
+}
+
+/// Visits every expression of a design.
+fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
+    for b in &mut design.bodies {
+        b.skeleton.iter_mut().flat_map(|p| &mut p.position).for_each(&mut *f);
+    }
+    for j in &mut design.joints {
+        j.point.iter_mut().for_each(&mut *f);
+        j.toward.iter_mut().flat_map(|(_, p)| p).for_each(&mut *f);
+    }
+    for r in &mut design.rods {
+        for end in [&mut r.from, &mut r.to] {
+            end.position.iter_mut().for_each(&mut *f);
+            end.derivative.iter_mut().for_each(&mut *f);
+        }
+        let Section::Ellipse { a, b } = &mut r.section;
+        f(a);
+        f(b);
+    }
+    for t in &mut design.traces {
+        t.point.iter_mut().for_each(&mut *f);
+    }
+}

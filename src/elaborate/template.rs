@@ -1,0 +1,414 @@
+//! Templates: `as crossed_leaves { … }` becomes rods between the joint's bodies, once per joint.
+
+use super::codes;
+use super::dimension::Dimension;
+use super::eval::{Env, Evaluator, Failed, Outcome};
+use super::load::item_kind;
+use super::scope::{Local, LocalKind, State};
+use super::value::{ItemRef, Scalar, Value};
+use crate::diagnostic::{Diagnostic, Origin};
+use crate::ir::expr::{ExprId, Node};
+use crate::ir::{BodyId, ExprPoint, JointId, Rod, RodEnd, Section};
+use crate::syntax::ast::{self, Expr, ExprKind, Flexure, Ident, Item, StatementKind, TemplateUse};
+
+/// Most rods of a design.
+const MAX_RODS: usize = 1024;
+
+/// What the compiler tells a template about the joint it replaces.
+pub struct Site<'s> {
+    /// Name of the joint: the first part of every path.
+    pub joint_name: &'s str,
+    pub joint: JointId,
+    pub bodies: &'s [BodyId],
+    /// Kind written in the text.
+    pub kind: &'s str,
+    pub shorter_link_mm: f64,
+    pub layer_height_mm: f64,
+    pub process: ItemRef,
+}
+
+impl<'a> Evaluator<'a> {
+    /// Elaborates one use of a template; returns its rods.
+    pub(super) fn template(
+        &mut self,
+        scope: usize,
+        module: usize,
+        text: &'a TemplateUse,
+        site: &Site<'_>,
+        rods: &mut Vec<Rod>,
+    ) -> Outcome<Vec<usize>> {
+        let (owner, flexure) = self.flexure(scope, module, &text.name)?;
+        if flexure.replaces.node != site.kind {
+            return self.fail(
+                Diagnostic::error(
+                    codes::TEMPLATE_KIND,
+                    format!(
+                        "`{}` replaces a {}, this joint is a {}",
+                        flexure.name.node, flexure.replaces.node, site.kind
+                    ),
+                    text.name.at,
+                )
+                .also(flexure.replaces.at, "declared here"),
+            );
+        }
+        let inner = self.scope(owner);
+        self.given_names(inner, site, text.name.at)?;
+        let mut ok = self.check_overrides(flexure, text);
+        for s in &flexure.statements {
+            match &s.kind {
+                StatementKind::Param { name, ty, value } => {
+                    self.template_param(scope, inner, (name, ty.as_ref(), value), text, site.joint_name);
+                }
+                StatementKind::Let { name, value } => {
+                    let env = Env::named(inner, format!("{}.{}", site.joint_name, name.node));
+                    let kind = LocalKind::Value { env, value, ty: None, point: false, default: None };
+                    self.declare(
+                        inner,
+                        Local { name: name.node.clone(), at: name.at, kind, state: State::Waiting },
+                    );
+                }
+                StatementKind::Rod(_) => {}
+                StatementKind::Broken => ok = Err(Failed),
+                StatementKind::Later { keyword } => {
+                    ok = self.later(codes::LATER_STATEMENT, &keyword.node, keyword.at);
+                }
+                _ => {
+                    ok = self.fail(
+                        Diagnostic::error(codes::MISPLACED, "this does not belong in a flexure", s.at)
+                            .help("a flexure holds `param`, `let` and `rod`"),
+                    );
+                }
+            }
+        }
+        for i in 0..self.scopes.get(inner).map_or(0, |s| s.locals.len()) {
+            let at = self.scopes.get(inner).and_then(|s| s.locals.get(i)).map(|l| l.at).unwrap_or_default();
+            if self.force(inner, i, at).is_err() {
+                ok = Err(Failed);
+            }
+        }
+        let mut made = Vec::new();
+        let mut names: Vec<&Ident> = Vec::new();
+        for s in &flexure.statements {
+            let StatementKind::Rod(rod) = &s.kind else { continue };
+            if let Some(first) = names.iter().find(|n| n.node == rod.name.node) {
+                ok = self.fail(
+                    Diagnostic::error(
+                        codes::DUPLICATE,
+                        format!("rod `{}` stands twice", rod.name.node),
+                        rod.name.at,
+                    )
+                    .label("again here")
+                    .also(first.at, "first here"),
+                );
+                continue;
+            }
+            names.push(&rod.name);
+            if rods.len() >= MAX_RODS {
+                return self.fail(Diagnostic::error(
+                    codes::TOO_LARGE,
+                    format!("more than {MAX_RODS} rods"),
+                    text.name.at,
+                ));
+            }
+            match self.rod(inner, rod, s.at, site) {
+                Ok(rod) => {
+                    made.push(rods.len());
+                    rods.push(rod);
+                }
+                Err(Failed) => ok = Err(Failed),
+            }
+        }
+        if names.is_empty() && ok.is_ok() {
+            return self.fail(Diagnostic::error(
+                codes::MISSING,
+                format!("flexure `{}` has no rod", flexure.name.node),
+                flexure.name.at,
+            ));
+        }
+        ok.map(|()| made)
+    }
+
+    fn flexure(&mut self, scope: usize, module: usize, name: &Ident) -> Outcome<(usize, &'a Flexure)> {
+        let Some(item) = self.top_level(module, name) else {
+            return self.unknown_item(scope, name, "flexure");
+        };
+        match self.program.item(item) {
+            Some(Item::Flexure(f)) => Ok((item.0, f)),
+            Some(other) => {
+                let is = item_kind(other).to_string();
+                self.wrong_kind(name, &is, "a flexure")
+            }
+            None => Err(Failed),
+        }
+    }
+
+    fn given_names(&mut self, inner: usize, site: &Site<'_>, at: Origin) -> Outcome<()> {
+        let shorter = self.constant(site.shorter_link_mm, at)?;
+        let height = self.constant(site.layer_height_mm, at)?;
+        let length = |id| Value::Scalar(Scalar { id, dim: Dimension::LENGTH });
+        for (name, value) in [
+            ("shorter_link", length(shorter)),
+            ("layer_height", length(height)),
+            ("process", Value::Record(site.process)),
+        ] {
+            let local = Local {
+                name: name.into(),
+                at: Origin::default(),
+                kind: LocalKind::Given,
+                state: State::Done(value),
+            };
+            self.declare(inner, local);
+        }
+        Ok(())
+    }
+
+    fn template_param(
+        &mut self,
+        outer: usize,
+        inner: usize,
+        (name, ty, value): (&'a Ident, Option<&'a Ident>, &'a Expr),
+        text: &'a TemplateUse,
+        joint: &str,
+    ) {
+        let path = format!("{joint}.{}", name.node);
+        let private = name.node.starts_with('_');
+        if !private {
+            self.settable.insert(path.clone());
+        }
+        let set = self.settings.find(&path).filter(|_| !private);
+        let given = text.overrides.iter().find(|(n, _)| n.node == name.node && !private);
+        // `--set` beats an override, an override beats the default.
+        let (scope, expr) = match (set, given) {
+            (Some((i, set)), _) => {
+                self.set_used.insert(i);
+                (outer, set)
+            }
+            (None, Some((_, e))) => (outer, Some(e)),
+            (None, None) => (inner, None),
+        };
+        let kind = match expr {
+            Some(expr) => LocalKind::Value {
+                env: Env::named(scope, path),
+                value: expr,
+                ty,
+                point: false,
+                default: Some((inner, value)),
+            },
+            None => LocalKind::Value { env: Env::named(inner, path), value, ty, point: false, default: None },
+        };
+        self.declare(inner, Local { name: name.node.clone(), at: name.at, kind, state: State::Waiting });
+    }
+
+    fn check_overrides(&mut self, flexure: &'a Flexure, text: &'a TemplateUse) -> Outcome<()> {
+        let mut ok = Ok(());
+        for (i, (name, _)) in text.overrides.iter().enumerate() {
+            if let Some((first, _)) = text.overrides.iter().take(i).find(|(n, _)| n.node == name.node) {
+                ok = self.fail(
+                    Diagnostic::error(codes::DUPLICATE, format!("`{}` is given twice", name.node), name.at)
+                        .label("again here")
+                        .also(first.at, "first here"),
+                );
+                continue;
+            }
+            let template = &flexure.name.node;
+            let declared = flexure.statements.iter().find_map(|s| match &s.kind {
+                StatementKind::Param { name: n, .. } if n.node == name.node => Some((true, n)),
+                StatementKind::Let { name: n, .. } if n.node == name.node => Some((false, n)),
+                _ => None,
+            });
+            match declared {
+                Some((true, n)) if n.node.starts_with('_') => {
+                    ok = self.fail(
+                        Diagnostic::error(
+                            codes::PRIVATE,
+                            format!("`{}` is private to `{template}`", n.node),
+                            name.at,
+                        )
+                        .also(n.at, "declared here"),
+                    );
+                }
+                Some((true, _)) => {}
+                Some((false, n)) => {
+                    ok = self.fail(
+                        Diagnostic::error(
+                            codes::WRONG_KIND,
+                            format!("`{}` is a `let` of `{template}`, not a parameter", name.node),
+                            name.at,
+                        )
+                        .also(n.at, "declared here"),
+                    );
+                }
+                None => {
+                    let params: Vec<&str> = flexure
+                        .statements
+                        .iter()
+                        .filter_map(|s| match &s.kind {
+                            StatementKind::Param { name, .. } if !name.node.starts_with('_') => {
+                                Some(name.node.as_str())
+                            }
+                            _ => None,
+                        })
+                        .collect();
+                    let d = Diagnostic::error(
+                        codes::UNKNOWN_NAME,
+                        format!("`{template}` has no parameter `{}`", name.node),
+                        name.at,
+                    );
+                    ok = self.fail(match super::names::suggestion(&name.node, params.iter().copied()) {
+                        Some(near) => d.help(format!("did you mean `{near}`?")),
+                        None => d.help(format!("it has {}", params.join(", "))),
+                    });
+                }
+            }
+        }
+        ok
+    }
+
+    fn rod(&mut self, scope: usize, rod: &'a ast::Rod, at: Origin, site: &Site<'_>) -> Outcome<Rod> {
+        let path = format!("{}.{}", site.joint_name, rod.name.node);
+        let from = self.rod_end(scope, &rod.from, site, &format!("{path}.from"));
+        let to = self.rod_end(scope, &rod.to, site, &format!("{path}.to"));
+        let section = self.section(scope, &rod.section, &path);
+        let (from, to) = (from?, to?);
+        if from.body == to.body {
+            return self.fail(Diagnostic::error(
+                codes::JOINT_BODIES,
+                format!("both ends of rod `{}` are in one body", rod.name.node),
+                rod.name.at,
+            ));
+        }
+        Ok(Rod { path, joint: site.joint, from, to, section: section?, origin: at })
+    }
+
+    fn rod_end(
+        &mut self,
+        scope: usize,
+        end: &'a ast::RodEnd,
+        site: &Site<'_>,
+        path: &str,
+    ) -> Outcome<RodEnd> {
+        let letters: Vec<String> =
+            site.bodies.iter().zip('a'..='z').map(|(_, letter)| letter.to_string()).collect();
+        let body = match letters.iter().position(|l| *l == end.body.node).and_then(|i| site.bodies.get(i)) {
+            Some(b) => Ok(*b),
+            None => self.fail(
+                Diagnostic::error(
+                    codes::UNKNOWN_NAME,
+                    format!("the joint has no body `{}`", end.body.node),
+                    end.body.at,
+                )
+                .help(format!("its bodies are {} in the order written", letters.join(", "))),
+            ),
+        };
+        let position = self.cylindrical(scope, &end.position, &format!("{path}.at"));
+        let derivative = self.cylindrical(scope, &end.along, &format!("{path}.along"));
+        let (body, position, derivative) = (body?, position?, derivative?);
+        if self.start_point(derivative).iter().all(|x| x.abs() < 1e-9) {
+            return self.fail(
+                Diagnostic::error(codes::SIZE, "the derivative at a rod's end must not vanish", end.along.at)
+                    .help("its direction is that of the rod there, its size about the rod's length"),
+            );
+        }
+        Ok(RodEnd { body, position, derivative })
+    }
+
+    /// `cyl(r, φ[, z])` as Cartesian components on (e1, e2, e3).
+    fn cylindrical(&mut self, scope: usize, e: &'a Expr, path: &str) -> Outcome<ExprPoint> {
+        let ExprKind::Call { function, arguments } = &e.kind else {
+            if matches!(e.kind, ExprKind::Broken) {
+                return Err(Failed);
+            }
+            return self.fail(
+                Diagnostic::error(codes::TYPE, "a rod's end is given in cylinder coordinates", e.at)
+                    .help("write `cyl(r, φ)` or `cyl(r, φ, z)` in the frame of the end's body"),
+            );
+        };
+        match function.node.as_str() {
+            "cyl" => {}
+            "sph" => return self.later(codes::LATER_TERM, "sph", function.at),
+            other => {
+                let other = other.to_string();
+                return self.fail(
+                    Diagnostic::error(
+                        codes::UNKNOWN_FUNCTION,
+                        format!("`{other}` does not give the place of a rod's end"),
+                        function.at,
+                    )
+                    .help("write `cyl(r, φ)` or `cyl(r, φ, z)`"),
+                );
+            }
+        }
+        let slots = self.arguments(function, arguments, &["r", "φ", "z"], 2)?;
+        let mut ids: Vec<Outcome<ExprId>> = Vec::new();
+        for (slot, (name, dim, what)) in slots.into_iter().zip([
+            ("r", Dimension::LENGTH, "the radius of `cyl`"),
+            ("phi", Dimension::ANGLE, "the angle of `cyl`"),
+            ("z", Dimension::LENGTH, "the height of `cyl`"),
+        ]) {
+            ids.push(match slot {
+                Some(e) => self.eval_scalar(&Env::named(scope, format!("{path}.{name}")), e, dim, what),
+                None => self.constant(0.0, e.at),
+            });
+        }
+        let [r, phi, z]: [Outcome<ExprId>; 3] = ids.try_into().map_err(|_| Failed)?;
+        let (r, phi, z) = (r?, phi?, z?);
+        let [x, y] = self.polar_components(r, phi, e.at)?;
+        Ok([x, y, z])
+    }
+
+    /// Sections are written in full widths and stored in semi-axes.
+    fn section(&mut self, scope: usize, e: &'a Expr, path: &str) -> Outcome<Section> {
+        let ExprKind::Call { function, arguments } = &e.kind else {
+            if matches!(e.kind, ExprKind::Broken) {
+                return Err(Failed);
+            }
+            return self.fail(
+                Diagnostic::error(codes::TYPE, "a section is needed", e.at)
+                    .help("write `ellipse(thick = …, wide = …)`"),
+            );
+        };
+        let widths: &[&str] = match function.node.as_str() {
+            "ellipse" => &["thick", "wide"],
+            "round" => &["d"],
+            "rect" => return self.later(codes::LATER_TERM, "rect", function.at),
+            other => {
+                let other = other.to_string();
+                return self.fail(
+                    Diagnostic::error(
+                        codes::UNKNOWN_FUNCTION,
+                        format!("there is no section `{other}`"),
+                        function.at,
+                    )
+                    .help("sections are `ellipse(thick = …, wide = …)` and `round(d)`"),
+                );
+            }
+        };
+        let slots = self.arguments(function, arguments, widths, widths.len())?;
+        let half = self.constant(0.5, e.at)?;
+        let mut semi = Vec::new();
+        for (slot, name) in slots.into_iter().zip(widths) {
+            let Some(width) = slot else { return Err(Failed) };
+            let what = format!("`{name}`");
+            let env = Env::named(scope, format!("{path}.section.{name}"));
+            let id = self.eval_scalar(&env, width, Dimension::LENGTH, &what)?;
+            let v = self.start_value(id);
+            if v.is_nan() || v <= 0.0 {
+                let shown = self.show(v, Dimension::LENGTH);
+                return self.fail(
+                    Diagnostic::error(
+                        codes::SIZE,
+                        format!("{what} of joint `{path}` must be positive"),
+                        width.at,
+                    )
+                    .label(format!("this is {shown}")),
+                );
+            }
+            semi.push(self.node(Node::Mul(id, half), e.at)?);
+        }
+        match semi.as_slice() {
+            [a, b] => Ok(Section::Ellipse { a: *a, b: *b }),
+            [d] => Ok(Section::Ellipse { a: *d, b: *d }),
+            _ => Err(Failed),
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! The words a line may start with, the form of each statement, and the nearest word to a typo.
+
+/// Words that start a top-level declaration.
+pub(super) const ITEM_WORDS: &[&str] =
+    &["edition", "use", "mechanism", "flexure", "material", "process", "motor"];
+
+/// Words that start a statement inside a block.
+pub(super) const STATEMENT_WORDS: &[&str] = &[
+    "param",
+    "let",
+    "point",
+    "ground",
+    "link",
+    "hinge",
+    "ball",
+    "universal",
+    "slider",
+    "cylindrical",
+    "fixed",
+    "material",
+    "print",
+    "links",
+    "cycle",
+    "drive",
+    "rest",
+    "trace",
+    "minimize",
+    "require",
+    "export",
+    "rod",
+    "allow",
+    "assert",
+    "body",
+    "case",
+    "fatigue",
+    "for",
+    "hole",
+    "horn",
+    "load",
+    "mirror",
+    "mount",
+    "output",
+    "place",
+    "plate",
+    "solid",
+    "spring",
+    "stop",
+    "string",
+    "sweep",
+    "target",
+    "tolerance",
+    "variant",
+];
+
+/// How a statement is written, by the word it starts with.
+pub(super) fn form(word: &str) -> Option<&'static str> {
+    Some(match word {
+        "edition" => "edition 1",
+        "use" => "use std.materials.NAME` or `use \"file.mech\"",
+        "mechanism" => "mechanism NAME {",
+        "flexure" => "flexure NAME replaces KIND {",
+        "process" => "process NAME {",
+        "motor" => "motor NAME {",
+        "param" => "param NAME: DIMENSION = VALUE",
+        "let" => "let NAME = VALUE",
+        "point" => "point NAME = (X, Y)",
+        "ground" => "ground NAME { POINT, … }",
+        "link" => "link NAME { POINT, … }",
+        "hinge" | "ball" | "universal" | "slider" | "cylindrical" | "fixed" => {
+            "KIND NAME: BODY to BODY at POINT"
+        }
+        "material" => "material NAME",
+        "print" => "print on PROCESS",
+        "links" => "links height LENGTH",
+        "cycle" => "cycle NUMBER steps over TIME",
+        "drive" => "drive JOINT from VALUE to VALUE with MOTOR",
+        "rest" => "rest JOINT at VALUE",
+        "trace" => "trace NAME = POINT on BODY",
+        "minimize" => "minimize {",
+        "term" => "TERM(…) weight NUMBER",
+        "field" => "NAME = VALUE",
+        "require" => "require VALUE <= VALUE",
+        "export" => "export NAME, …",
+        "rod" => "rod NAME { from a at … along … to b at … along … section … }",
+        _ => return None,
+    })
+}
+
+/// The known word that a misspelt one most likely stands for.
+pub(super) fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
+    let lower = word.to_ascii_lowercase();
+    // A third of the letters may be wrong, transposed neighbours count once.
+    let limit = (word.len() / 3).max(1);
+    known
+        .iter()
+        .map(|k| (strsim::damerau_levenshtein(&lower, k), *k))
+        .filter(|(distance, _)| *distance <= limit)
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, k)| k)
+}
