@@ -210,7 +210,10 @@ fn open(common: &Common) -> Result<Opened, (PathBuf, FileError)> {
     let (folder, source) = Folder::of(&common.source).map_err(fail)?;
     // Read once here so that an unreadable source is told from an unreadable import.
     read_text(&folder.root().join(&source)).map_err(fail)?;
-    let shown = common.source.parent().map(Path::to_path_buf).unwrap_or_default();
+    // As the user wrote it, unless a symbolic link to the source leads elsewhere.
+    let written = common.source.parent().map(Path::to_path_buf).unwrap_or_default();
+    let same = Path::new(".").join(&written).canonicalize().is_ok_and(|p| p == folder.root());
+    let shown = if same { written } else { folder.root().to_path_buf() };
     let request = Request {
         source,
         overrides: common.overrides.clone(),
