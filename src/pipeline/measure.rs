@@ -28,8 +28,7 @@ pub fn measure(design: &Design, simulation: &Simulation) -> Measures {
         measures.drives.insert(drive.name.clone(), DriveMeasures { max_torque_n_mm });
     }
     let stress = series(simulation, &Quantity::Stress);
-    let max_mpa =
-        if design.rods.is_empty() { None } else { aggregate(&stress, Aggregate::Max, closed) };
+    let max_mpa = if design.rods.is_empty() { None } else { aggregate(&stress, Aggregate::Max, closed) };
     measures.stress = StressMeasures { max_mpa };
     measures.gap = GapMeasures { least_mm: simulation.least_gap_mm };
     measures

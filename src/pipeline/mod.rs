@@ -262,17 +262,21 @@ fn read_lock(
 }
 
 fn frozen(design: &Design) -> Diagnostic {
-    Diagnostic::error("E0710", "the lock does not belong to this design, and `--frozen` forbids solving", design.origin)
-        .help("build without `--frozen` and keep the new lock")
+    Diagnostic::error(
+        "E0710",
+        "the lock does not belong to this design, and `--frozen` forbids solving",
+        design.origin,
+    )
+    .help("build without `--frozen` and keep the new lock")
 }
 
 fn emit_sketches(design: &Design, out: &mut BuildOutcome) {
     for export in &design.exports {
         let ExportKind::Arduino(drive) = export.kind else { continue };
         match Sketch::of(design, drive).and_then(|s| Ok((s.name(), s.render()?))) {
-            Ok((name, text)) => out
-                .artefacts
-                .push(Artefact { name: format!("{name}/{name}.ino"), bytes: text.into_bytes() }),
+            Ok((name, text)) => {
+                out.artefacts.push(Artefact { name: format!("{name}/{name}.ino"), bytes: text.into_bytes() })
+            }
             Err(e) => {
                 let message = format!("no sketch can be written: {e}");
                 out.diagnostics.push(Diagnostic::error("E0720", message, export.origin));

@@ -1,0 +1,255 @@
+//! One function a command: files to a request, the pipeline, its outcome to files and reports.
+
+use super::artefacts::{WriteError, write_atomic, write_below};
+use super::progress::Terminal;
+use super::sources::{Folder, read_text};
+use super::style::Style;
+use super::{Build, Common, Format, Simulate, human, render};
+use flexura::diagnostic::{Severity, SourceMap};
+use flexura::emit::csv::write_csv;
+use flexura::pipeline::{self, BuildOutcome, Compiler, FileError, Request, Show, placeless};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Exit code: all is well.
+pub const FINE: u8 = 0;
+/// Exit code: the design has errors, a requirement fails, or a file cannot be read or written.
+pub const FAILED: u8 = 1;
+/// Exit code after a second Ctrl-C, as shells have it for SIGINT.
+const INTERRUPTED: i32 = 130;
+
+/// `flexura check`.
+pub fn check(common: &Common) -> u8 {
+    let opened = match open(common) {
+        Ok(opened) => opened,
+        Err(why) => return unreadable(common, &why),
+    };
+    let out = pipeline::check(&opened.request, &Compiler, &opened.folder);
+    render::report(&out.diagnostics, &out.sources, common.format);
+    if let (Some(design), Format::Human) = (&out.design, common.format) {
+        println!("{}: no errors", design.name);
+    }
+    code(&out)
+}
+
+/// `flexura ir`.
+pub fn ir(common: &Common) -> u8 {
+    let opened = match open(common) {
+        Ok(opened) => opened,
+        Err(why) => return unreadable(common, &why),
+    };
+    let out = pipeline::check(&opened.request, &Compiler, &opened.folder);
+    match &out.design {
+        // The output is the design: findings go to the standard error in either format.
+        Some(design) => {
+            render::show(&out.diagnostics, &out.sources);
+            match serde_json::to_string_pretty(design) {
+                Ok(text) => print(&format!("{text}\n")),
+                Err(e) => {
+                    eprintln!("error: {e}");
+                    FAILED
+                }
+            }
+        }
+        None => {
+            render::report(&out.diagnostics, &out.sources, common.format);
+            FAILED
+        }
+    }
+}
+
+/// `flexura simulate`.
+pub fn simulate(arguments: &Simulate) -> u8 {
+    let common = &arguments.common;
+    let mut opened = match open(common) {
+        Ok(opened) => opened,
+        Err(why) => return unreadable(common, &why),
+    };
+    opened.request.fresh = arguments.fresh;
+    opened.request.frozen = arguments.frozen;
+    if let Err(why) = opened.read_lock(common, &arguments.out) {
+        return unreadable(common, &why);
+    }
+    let show = Show { rigid: arguments.rigid, poses: arguments.poses };
+    let (out, simulation) = pipeline::simulate(&opened.request, show, &Compiler, &opened.folder);
+    // The table may go to the standard output: findings never do.
+    match common.format {
+        Format::Human => render::show(&out.diagnostics, &out.sources),
+        Format::Json => {
+            for value in render::json(&out.diagnostics, &out.sources) {
+                eprintln!("{value}");
+            }
+        }
+    }
+    let Some(simulation) = simulation else { return FAILED };
+    let text = write_csv(&simulation.motion);
+    let written = if arguments.output == Path::new("-") {
+        print(&text)
+    } else {
+        match write_atomic(&arguments.output, text.as_bytes()) {
+            Ok(()) => FINE,
+            Err(e) => {
+                eprintln!("error: {e}");
+                FAILED
+            }
+        }
+    };
+    written.max(code(&out))
+}
+
+/// `flexura build`.
+pub fn build(arguments: &Build) -> u8 {
+    let common = &arguments.common;
+    let mut opened = match open(common) {
+        Ok(opened) => opened,
+        Err(why) => return finish_build(unopened(&why), common.format, &[]),
+    };
+    opened.request.fresh = arguments.fresh;
+    opened.request.frozen = arguments.frozen;
+    let lock_path = match opened.read_lock(common, &arguments.out) {
+        Ok(path) => path,
+        Err(why) => return finish_build(unopened(&why), common.format, &[]),
+    };
+    let cancel = stop_on_ctrl_c();
+    let progress = Terminal::new(common.format == Format::Human);
+    let mut out = pipeline::build(&opened.request, &Compiler, &opened.folder, &progress, &cancel);
+    progress.finish();
+    let written = match write(&out, &arguments.out, &lock_path) {
+        Ok(written) => written,
+        Err(e) => {
+            out.diagnostics.push(placeless(Severity::Error, "E0731", e.to_string()));
+            Vec::new()
+        }
+    };
+    finish_build(out, common.format, &written)
+}
+
+/// Reports a build, in either format.
+fn finish_build(out: BuildOutcome, format: Format, written: &[(String, usize)]) -> u8 {
+    match format {
+        Format::Human => {
+            render::show(&out.diagnostics, &out.sources);
+            if out.design.is_some() {
+                print(&human::report(&out, written, Style::stdout()));
+            }
+        }
+        Format::Json => {
+            print(&format!("{}\n", json(&out)));
+        }
+    }
+    code(&out)
+}
+
+/// The object that scripts rely on.
+fn json(out: &BuildOutcome) -> serde_json::Value {
+    serde_json::json!({
+        "design_parameters": out.design.as_ref().map(|d| d.free.len()),
+        "iterations": out.solution.as_ref().map(|s| s.iterations),
+        "before": out.before,
+        "after": out.after,
+        "seconds": out.seconds,
+        "artefacts": out.artefacts.iter().map(|a| &a.name).collect::<Vec<_>>(),
+        "diagnostics": render::json(&out.diagnostics, &out.sources),
+    })
+}
+
+/// Writes lock and artefacts; returns their paths and sizes.
+fn write(out: &BuildOutcome, folder: &Path, lock_path: &Path) -> Result<Vec<(String, usize)>, WriteError> {
+    let mut written = Vec::new();
+    if let Some(lock) = &out.lock {
+        write_atomic(lock_path, lock.as_bytes())?;
+        written.push((lock_path.display().to_string(), lock.len()));
+    }
+    for artefact in &out.artefacts {
+        let path = write_below(folder, &artefact.name, &artefact.bytes)?;
+        written.push((path.display().to_string(), artefact.bytes.len()));
+    }
+    Ok(written)
+}
+
+fn code(out: &BuildOutcome) -> u8 {
+    if out.failed() { FAILED } else { FINE }
+}
+
+/// Writes to the standard output; a reader that went away is no reason to panic.
+fn print(text: &str) -> u8 {
+    let mut stdout = std::io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Ok(()) => FINE,
+        Err(_) => FAILED,
+    }
+}
+
+/// Set by the first Ctrl-C; the second ends the program.
+fn stop_on_ctrl_c() -> Arc<AtomicBool> {
+    let cancel = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&cancel);
+    let handler = move || {
+        if flag.swap(true, Ordering::SeqCst) {
+            std::process::exit(INTERRUPTED);
+        }
+    };
+    if let Err(e) = ctrlc::set_handler(handler) {
+        eprintln!("warning: Ctrl-C will not keep the best point: {e}");
+    }
+    cancel
+}
+
+/// A source and the folder it stands in.
+struct Opened {
+    folder: Folder,
+    request: Request,
+    /// Folder as the user wrote it, for messages and for the lock.
+    shown: PathBuf,
+}
+
+fn open(common: &Common) -> Result<Opened, (PathBuf, FileError)> {
+    let fail = |e| (common.source.clone(), e);
+    let (folder, source) = Folder::of(&common.source).map_err(fail)?;
+    // Read once here so that an unreadable source is told from an unreadable import.
+    read_text(&folder.root().join(&source)).map_err(fail)?;
+    // As the user wrote it, unless a symbolic link to the source leads elsewhere.
+    let written = common.source.parent().map(Path::to_path_buf).unwrap_or_default();
+    let same = Path::new(".").join(&written).canonicalize().is_ok_and(|p| p == folder.root());
+    let shown = if same { written } else { folder.root().to_path_buf() };
+    let request = Request {
+        source,
+        overrides: common.overrides.clone(),
+        steps: common.steps.map(|n| n as usize),
+        ..Request::default()
+    };
+    Ok(Opened { folder, request, shown })
+}
+
+impl Opened {
+    /// Reads the lock, if there is one; returns where it belongs.
+    fn read_lock(&mut self, common: &Common, out: &Path) -> Result<PathBuf, (PathBuf, FileError)> {
+        let stem = self.request.source.strip_suffix(".mech").unwrap_or(&self.request.source);
+        let name = format!("{stem}.lock");
+        let tried_out = !common.overrides.is_empty() || common.steps.is_some();
+        let path = if tried_out { out.join(&name) } else { self.shown.join(&name) };
+        match read_text(&path) {
+            Ok(text) => self.request.lock = Some((name, text)),
+            Err(FileError::NotFound) => {}
+            Err(_) if self.request.fresh => {}
+            Err(e) => return Err((path, e)),
+        }
+        Ok(path)
+    }
+}
+
+fn unreadable(common: &Common, why: &(PathBuf, FileError)) -> u8 {
+    render::report(&unopened(why).diagnostics, &SourceMap::default(), common.format);
+    FAILED
+}
+
+/// The outcome when not even the first file could be read.
+fn unopened((path, why): &(PathBuf, FileError)) -> BuildOutcome {
+    let message = format!("cannot read `{}`: {why}", path.display());
+    BuildOutcome {
+        diagnostics: vec![placeless(Severity::Error, "E0730", message)],
+        ..BuildOutcome::default()
+    }
+}

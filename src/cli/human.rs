@@ -1,0 +1,160 @@
+//! What a build tells a person: short, aligned, the numbers that matter first.
+
+use super::style::Style;
+use flexura::pipeline::{BuildOutcome, Measures, Origin};
+use std::fmt::Write;
+
+/// The report of a build; `written` are the files with their sizes in bytes.
+pub fn report(out: &BuildOutcome, written: &[(String, usize)], style: Style) -> String {
+    let mut text = String::new();
+    if let Some(design) = &out.design {
+        let joints = design.joints.iter().filter(|j| j.is_compliant()).count();
+        let _ = writeln!(
+            text,
+            "{}  {}, {} flexible of {}, {}, {}",
+            style.bold(&design.name),
+            count(design.bodies.len(), "body", "bodies"),
+            joints,
+            count(design.joints.len(), "joint", "joints"),
+            count(design.rods.len(), "rod", "rods"),
+            count(design.free.len(), "free variable", "free variables"),
+        );
+    }
+    if let Some(solution) = &out.solution {
+        let how = match out.solved_from {
+            Origin::Nothing => String::new(),
+            Origin::Lock => "taken from the lock, nothing to solve".into(),
+            Origin::Start => count(solution.iterations, "iteration", "iterations"),
+            Origin::OldLock => {
+                format!(
+                    "{} from the old lock's values",
+                    count(solution.iterations, "iteration", "iterations")
+                )
+            }
+        };
+        let end = if solution.converged { "converged" } else { "not converged" };
+        let _ = writeln!(text, "solved  {how}, {end}");
+    }
+    measures(&mut text, out.before.as_ref(), out.after.as_ref(), style);
+    requirements(&mut text, out, style);
+    artefacts(&mut text, written, style);
+    let s = &out.seconds;
+    let times = format!(
+        "{:.2} s: check {:.2}, solve {:.2}, mesh {:.2}, emit {:.2}",
+        s.total, s.check, s.solve, s.mesh, s.emit
+    );
+    let _ = writeln!(text, "\n{}", style.dim(&times));
+    text
+}
+
+fn measures(text: &mut String, before: Option<&Measures>, after: Option<&Measures>, style: Style) {
+    let Some(result) = after.or(before) else { return };
+    let mut rows: Vec<(String, Option<f64>, Option<f64>, &str)> = Vec::new();
+    for name in result.traces.keys() {
+        let of = |m: Option<&Measures>| m.and_then(|m| m.traces.get(name)).cloned();
+        let (b, a) = (of(before), of(after));
+        let mean = |t: &Option<flexura::pipeline::TraceMeasures>| t.as_ref().map(|t| t.mean_error_mm);
+        let most = |t: &Option<flexura::pipeline::TraceMeasures>| t.as_ref().map(|t| t.max_error_mm);
+        rows.push((format!("{name}, mean error"), mean(&b), mean(&a), "mm"));
+        rows.push((format!("{name}, largest error"), most(&b), most(&a), "mm"));
+    }
+    for name in result.drives.keys() {
+        let of = |m: Option<&Measures>| m.and_then(|m| m.drives.get(name)).map(|d| d.max_torque_n_mm);
+        rows.push((format!("{name}, largest torque"), of(before), of(after), "N·mm"));
+    }
+    let stress = |m: Option<&Measures>| m.and_then(|m| m.stress.max_mpa);
+    if stress(before).or(stress(after)).is_some() {
+        rows.push(("largest stress".into(), stress(before), stress(after), "MPa"));
+    }
+    let gap = |m: Option<&Measures>| m.and_then(|m| m.gap.least_mm);
+    if gap(before).or(gap(after)).is_some() {
+        rows.push(("least gap".into(), gap(before), gap(after), "mm"));
+    }
+    let width = rows.iter().map(|r| r.0.chars().count()).max().unwrap_or(0).max(16);
+    let heading = format!("{:width$}  {:>10}  {:>10}", "", "before", "after");
+    let _ = writeln!(text, "\n{}", style.dim(&heading));
+    for (name, b, a, unit) in rows {
+        let _ = writeln!(
+            text,
+            "{name:width$}  {:>10}  {}  {unit}",
+            number(b),
+            style.bold(&format!("{:>10}", number(a)))
+        );
+    }
+}
+
+fn requirements(text: &mut String, out: &BuildOutcome, style: Style) {
+    if out.requirements.is_empty() {
+        return;
+    }
+    let width = out.requirements.iter().map(|r| r.text.chars().count()).max().unwrap_or(0);
+    text.push('\n');
+    for r in &out.requirements {
+        let verdict = if r.pass { style.green("pass") } else { style.red("FAIL") };
+        let _ = writeln!(text, "{verdict}  {:width$}  {:>10} {}", r.text, number(r.value), r.unit);
+    }
+}
+
+fn artefacts(text: &mut String, written: &[(String, usize)], style: Style) {
+    if written.is_empty() {
+        return;
+    }
+    let width = written.iter().map(|w| w.0.chars().count()).max().unwrap_or(0);
+    text.push('\n');
+    for (path, bytes) in written {
+        let _ = writeln!(text, "{path:width$}  {}", style.dim(&format!("{:>9}", size(*bytes))));
+    }
+}
+
+fn number(value: Option<f64>) -> String {
+    value.map_or("-".into(), |v| format!("{v:.3}"))
+}
+
+fn size(bytes: usize) -> String {
+    match bytes {
+        0..1_000 => format!("{bytes} B"),
+        1_000..1_000_000 => format!("{:.1} kB", bytes as f64 / 1e3),
+        _ => format!("{:.1} MB", bytes as f64 / 1e6),
+    }
+}
+
+fn count(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flexura::pipeline::{DriveMeasures, RequirementResult, Seconds, StressMeasures, TraceMeasures};
+
+    fn sample(mean: f64) -> Measures {
+        let trace = TraceMeasures { mean_error_mm: mean, max_error_mm: 2.0 * mean, path_length_mm: 300.0 };
+        Measures {
+            traces: [("tip".to_string(), trace)].into(),
+            drives: [("motor".to_string(), DriveMeasures { max_torque_n_mm: 41.5 })].into(),
+            stress: StressMeasures { max_mpa: Some(24.91) },
+            ..Measures::default()
+        }
+    }
+
+    #[test]
+    fn a_build_in_a_few_lines() {
+        let out = BuildOutcome {
+            before: Some(sample(6.0)),
+            after: Some(sample(0.17)),
+            solution: Some(flexura::ir::Solution { iterations: 23, converged: true, ..Default::default() }),
+            solved_from: Origin::Start,
+            requirements: vec![RequirementResult {
+                text: "max(error(tip)) <= 1 mm".into(),
+                value: Some(0.34),
+                unit: "mm",
+                bound: 1.0,
+                pass: true,
+            }],
+            seconds: Seconds { total: 3.21, check: 0.01, solve: 2.5, mesh: 0.6, emit: 0.1 },
+            ..BuildOutcome::default()
+        };
+        let written = [("out/part.stl".to_string(), 1_234_567), ("out/s/s.ino".to_string(), 4321)];
+        insta::assert_snapshot!(report(&out, &written, Style::plain()));
+    }
+}

@@ -1,0 +1,145 @@
+//! Commands and their arguments. Everything that touches the world (disk, terminal, clock, signals,
+//! threads) lives in this folder.
+
+mod artefacts;
+mod commands;
+mod human;
+mod progress;
+mod render;
+mod sources;
+mod style;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Compliant mechanisms from text: optimised flexures, printable parts, motor code.
+///
+/// Exit codes: 0 fine, 1 the design has errors or a requirement fails, 2 wrong usage.
+#[derive(Debug, Parser)]
+#[command(name = "flexura", version, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Read a design and say what is wrong with it
+    Check(Common),
+    /// Solve a design and write its parts and sketches
+    ///
+    /// The solved values go into NAME.lock beside the source; with --set or --steps it goes into the
+    /// output folder, so that trying things out leaves the design's own lock alone. Ctrl-C ends the
+    /// optimisation and keeps the best point found; a second one ends the program at once.
+    Build(Build),
+    /// Write the motion over the cycle as CSV
+    ///
+    /// Shows the lock's values if it belongs to the design, else the design's start.
+    Simulate(Simulate),
+    /// Print the elaborated design as JSON
+    Ir(Common),
+}
+
+/// What every command takes.
+#[derive(Clone, Debug, Args)]
+struct Common {
+    /// The design, a `.mech` file
+    source: PathBuf,
+    /// Override a parameter, e.g. --set "r=25 mm" (repeatable)
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
+    overrides: Vec<(String, String)>,
+    /// Number of steps of the cycle
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    steps: Option<u32>,
+    /// Number of threads [default: one a core]; the result does not depend on it
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// How to report
+    #[arg(long, value_enum, default_value_t = Format::Human)]
+    format: Format,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// For people
+    Human,
+    /// For scripts: one JSON object
+    Json,
+}
+
+#[derive(Debug, Args)]
+struct Build {
+    #[command(flatten)]
+    common: Common,
+    /// Folder for everything that is made
+    #[arg(long, value_name = "FOLDER", default_value = "out")]
+    out: PathBuf,
+    /// Ignore the lock and solve from the design's own start
+    #[arg(long)]
+    fresh: bool,
+    /// Refuse to solve: the lock must belong to the design
+    #[arg(long, conflicts_with = "fresh")]
+    frozen: bool,
+}
+
+#[derive(Debug, Args)]
+struct Simulate {
+    #[command(flatten)]
+    common: Common,
+    /// The conventional mechanism's motion
+    #[arg(long)]
+    rigid: bool,
+    /// Add translation and rotation vector of every moving body from rest
+    #[arg(long)]
+    poses: bool,
+    /// Where to write the table; `-` is the standard output
+    #[arg(long, short, value_name = "FILE", default_value = "-")]
+    output: PathBuf,
+    /// Folder of the lock when --set or --steps is given
+    #[arg(long, value_name = "FOLDER", default_value = "out")]
+    out: PathBuf,
+    /// Ignore the lock and show the design's own start
+    #[arg(long)]
+    fresh: bool,
+    /// Refuse to show anything but the lock's values
+    #[arg(long, conflicts_with = "fresh")]
+    frozen: bool,
+}
+
+/// Runs the command line.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let threads = match &cli.command {
+        Command::Check(common) | Command::Ir(common) => common.threads,
+        Command::Build(build) => build.common.threads,
+        Command::Simulate(simulate) => simulate.common.threads,
+    };
+    let run = || match &cli.command {
+        Command::Check(common) => commands::check(common),
+        Command::Build(arguments) => commands::build(arguments),
+        Command::Simulate(arguments) => commands::simulate(arguments),
+        Command::Ir(common) => commands::ir(common),
+    };
+    let code = match threads {
+        None => run(),
+        Some(n) => match rayon::ThreadPoolBuilder::new().num_threads(usize::from(n)).build() {
+            Ok(pool) => pool.install(run),
+            Err(e) => {
+                eprintln!("error: cannot start {n} threads: {e}");
+                commands::FAILED
+            }
+        },
+    };
+    ExitCode::from(code)
+}
+
+/// `NAME=VALUE`.
+fn assignment(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {
+            Ok((name.trim().into(), value.trim().into()))
+        }
+        _ => Err("write it as NAME=VALUE, for example r=25 mm".into()),
+    }
+}

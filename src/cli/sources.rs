@@ -1,0 +1,116 @@
+//! Reading from the disk: only text files below the design's own folder, and not without limit.
+
+use flexura::pipeline::{FileError, Files};
+use std::fs::File;
+use std::io::{ErrorKind, Read};
+use std::path::{Component, Path, PathBuf};
+
+/// Largest file read, bytes. The sample designs have about 3 kB, their locks less.
+pub const MOST_BYTES: u64 = 4 << 20;
+
+/// The files below one folder.
+pub struct Folder {
+    root: PathBuf,
+}
+
+impl Folder {
+    /// The folder of a source, and the source's name in it.
+    pub fn of(source: &Path) -> Result<(Self, String), FileError> {
+        let path = source.canonicalize().map_err(|e| reason(&e))?;
+        let name = path.file_name().and_then(|n| n.to_str()).ok_or_else(not_a_name)?.to_string();
+        let root = path.parent().ok_or_else(not_a_name)?.to_path_buf();
+        Ok((Self { root }, name))
+    }
+
+    /// The folder itself, without symbolic links.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+}
+
+impl Files for Folder {
+    fn read(&self, path: &str) -> Result<String, FileError> {
+        let relative = Path::new(path);
+        if !relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir)) {
+            return Err(FileError::Outside);
+        }
+        let full = self.root.join(relative).canonicalize().map_err(|e| reason(&e))?;
+        if !full.starts_with(&self.root) {
+            return Err(FileError::Outside);
+        }
+        read_text(&full)
+    }
+}
+
+/// Text of a file, if it is a file, text, and not too large. (A pipe could block for ever.)
+pub fn read_text(path: &Path) -> Result<String, FileError> {
+    if !path.metadata().map_err(|e| reason(&e))?.is_file() {
+        return Err(FileError::Other("it is not a file".into()));
+    }
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(|e| reason(&e))?;
+    file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(|e| reason(&e))?;
+    if bytes.len() as u64 > MOST_BYTES {
+        return Err(FileError::TooLarge);
+    }
+    String::from_utf8(bytes).map_err(|_| FileError::NotText)
+}
+
+fn reason(error: &std::io::Error) -> FileError {
+    match error.kind() {
+        ErrorKind::NotFound | ErrorKind::NotADirectory => FileError::NotFound,
+        _ => FileError::Other(error.to_string()),
+    }
+}
+
+fn not_a_name() -> FileError {
+    FileError::Other("its name is not UTF-8 text".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reads_only_below_its_folder() {
+        let outer = tempfile::tempdir().unwrap();
+        let inner = outer.path().join("inner");
+        std::fs::create_dir_all(inner.join("parts")).unwrap();
+        std::fs::write(outer.path().join("secret.mech"), "no").unwrap();
+        std::fs::write(inner.join("a.mech"), "yes").unwrap();
+        std::fs::write(inner.join("parts/b.mech"), "also").unwrap();
+        std::fs::write(inner.join("bytes.mech"), [0xff, 0xfe]).unwrap();
+        let (folder, name) = Folder::of(&inner.join("a.mech")).unwrap();
+        assert_eq!(name, "a.mech");
+        assert_eq!(folder.read("a.mech").unwrap(), "yes");
+        assert_eq!(folder.read("parts/b.mech").unwrap(), "also");
+        assert_eq!(folder.read("../secret.mech"), Err(FileError::Outside));
+        assert_eq!(folder.read("parts/../../secret.mech"), Err(FileError::Outside));
+        let absolute = outer.path().join("secret.mech");
+        assert_eq!(folder.read(absolute.to_str().unwrap()), Err(FileError::Outside));
+        assert_eq!(folder.read("none.mech"), Err(FileError::NotFound));
+        assert_eq!(folder.read("bytes.mech"), Err(FileError::NotText));
+        assert!(matches!(folder.read("parts"), Err(FileError::Other(_))));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn follows_no_link_out_of_its_folder() {
+        let outer = tempfile::tempdir().unwrap();
+        let inner = outer.path().join("inner");
+        std::fs::create_dir(&inner).unwrap();
+        std::fs::write(inner.join("a.mech"), "yes").unwrap();
+        std::fs::write(outer.path().join("secret.mech"), "no").unwrap();
+        std::os::unix::fs::symlink("../secret.mech", inner.join("link.mech")).unwrap();
+        let (folder, _) = Folder::of(&inner.join("a.mech")).unwrap();
+        assert_eq!(folder.read("link.mech"), Err(FileError::Outside));
+    }
+
+    #[test]
+    fn refuses_what_is_too_large() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("large.mech");
+        std::fs::write(&path, vec![b' '; MOST_BYTES as usize + 1]).unwrap();
+        assert_eq!(read_text(&path), Err(FileError::TooLarge));
+    }
+}

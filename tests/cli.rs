@@ -1,0 +1,88 @@
+//! The command line as scripts see it: exit codes, where output goes, and what is refused.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn flexura(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_flexura")).args(arguments).current_dir(folder).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+#[test]
+fn wrong_usage_is_2() {
+    let dir = tempfile::tempdir().unwrap();
+    for arguments in [
+        &[][..],
+        &["bake", "a.mech"],
+        &["build"],
+        &["build", "a.mech", "--set", "r"],
+        &["build", "a.mech", "--set", "=3 mm"],
+        &["build", "a.mech", "--steps", "0"],
+        &["build", "a.mech", "--threads", "many"],
+        &["build", "a.mech", "--fresh", "--frozen"],
+        &["build", "a.mech", "--format", "xml"],
+        &["check", "a.mech", "--rigid"],
+    ] {
+        let output = flexura(dir.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+        assert!(!output.stderr.is_empty(), "{arguments:?}");
+    }
+}
+
+#[test]
+fn help_and_version_are_0() {
+    let dir = tempfile::tempdir().unwrap();
+    let help = flexura(dir.path(), &["--help"]);
+    assert_eq!(help.status.code(), Some(0));
+    for command in ["check", "build", "simulate", "ir"] {
+        assert!(text(&help.stdout).contains(command), "{command}");
+        assert_eq!(flexura(dir.path(), &[command, "--help"]).status.code(), Some(0));
+    }
+    assert!(text(&flexura(dir.path(), &["--version"]).stdout).starts_with("flexura "));
+}
+
+#[test]
+fn an_unreadable_source_is_1_and_says_why() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::create_dir(dir.path().join("folder.mech")).unwrap();
+    std::fs::write(dir.path().join("bytes.mech"), [0xff, 0xfe, 0x00]).unwrap();
+    for (source, reason) in
+        [("none.mech", "no such file"), ("folder.mech", "not a file"), ("bytes.mech", "not UTF-8")]
+    {
+        for command in ["check", "build", "simulate", "ir"] {
+            let output = flexura(dir.path(), &[command, source]);
+            assert_eq!(output.status.code(), Some(1), "{command} {source}");
+            let said = text(&output.stderr);
+            assert!(said.contains("E0730") && said.contains(reason), "{command} {source}: {said}");
+            assert!(output.stdout.is_empty());
+        }
+    }
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2, "nothing is written");
+}
+
+#[test]
+fn json_goes_to_the_standard_output_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    let output = flexura(dir.path(), &["build", "none.mech", "--format", "json"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(output.stderr.is_empty());
+    let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let keys: Vec<&str> = value.as_object().unwrap().keys().map(String::as_str).collect();
+    let mut expected =
+        vec!["design_parameters", "iterations", "before", "after", "seconds", "artefacts", "diagnostics"];
+    expected.sort_unstable();
+    assert_eq!(keys, expected);
+    assert_eq!(value["diagnostics"][0]["code"], "E0730");
+    assert_eq!(value["before"], serde_json::Value::Null);
+}
+
+#[test]
+fn nothing_is_coloured_away_from_a_terminal() {
+    let dir = tempfile::tempdir().unwrap();
+    let output = flexura(dir.path(), &["check", "none.mech"]);
+    assert!(!text(&output.stderr).contains('\x1b'));
+}
