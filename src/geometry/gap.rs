@@ -9,8 +9,10 @@ use crate::math::Pose;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// Part of a flexure's length next to either end that may lie in its own link.
-const ROOT_MM: f64 = 2.5;
+/// Next to its ends a flexure cannot keep the clearance from its own link, mm…
+const NEAR_MM: f64 = 4.0;
+/// … but farther than this from its attachment planes it must not be swallowed by it, mm.
+const ROOT_MM: f64 = 0.6;
 
 /// One side of an overlap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,18 +60,22 @@ pub fn fusions(input: &PartsInput, plans: &[BodyPlan], groups: &[Vec<usize>]) ->
     }
     for (f, flexure) in input.flexures.iter().enumerate() {
         let whole = flexure.slots();
-        // Of its own bodies a flexure may touch its stubs, and anything near its ends.
         let (first, last) = (flexure.end_point(false), flexure.end_point(true));
-        let clear_of_ends = |s: &Slot| {
-            (s.start - first).norm().min((s.end - first).norm()) > ROOT_MM
-                && (s.start - last).norm().min((s.end - last).norm()) > ROOT_MM
+        let beyond = |depth: f64| -> Vec<Slot> {
+            let away = |p: &Vector3<f64>| (p - first).norm().min((p - last).norm()) > depth;
+            whole.iter().filter(|s| away(&s.start) && away(&s.end)).copied().collect()
         };
-        let inner: Vec<Slot> = whole.iter().filter(|s| clear_of_ends(s)).copied().collect();
+        let (free, inner) = (beyond(ROOT_MM), beyond(NEAR_MM));
         for (i, plan) in plans.iter().enumerate() {
             let attached = i == flexure.bodies.0 || i == flexure.bodies.1;
             let own_stub = |role: &Role| attached && *role == Role::Stub(f);
             let slots: Vec<Slot> = plan.slots.iter().filter(|(r, _)| !own_stub(r)).map(|(_, s)| *s).collect();
-            if let Some(s) = worst(&slots, if attached { &inner } else { &whole }, input.clearance_mm) {
+            let found_here = if attached {
+                worst(&slots, &free, 0.0).or_else(|| worst(&slots, &inner, input.clearance_mm))
+            } else {
+                worst(&slots, &whole, input.clearance_mm)
+            };
+            if let Some(s) = found_here {
                 let same_part = group_of(i) == group_of(flexure.bodies.0);
                 found.push(Fusion {
                     a: Member::Body(i),

@@ -5,6 +5,7 @@
 //! its neck, so that no two faces coincide and the boolean kernel meets only clear crossings. What
 //! is left (bars side by side under one boss) is kept apart by a small spread of heights.
 
+use super::distance::separation;
 use super::mesh::Mesh;
 use super::parts::{Bore, Eye, FLOOR_MM, GeometryError, PartsInput};
 use super::skeleton::connect;
@@ -36,6 +37,8 @@ const ROUND_MM: f64 = 0.8;
 const STUB_ROUND_MM: f64 = 0.5;
 /// Wall round a bore, mm; the process's least wall if that is more.
 const BORE_WALL_MM: f64 = 2.0;
+/// Next to its attachment a flexure may be nearer to its own link's bars than the clearance, mm.
+const OWN_ROOT_MM: f64 = 2.0;
 /// Points nearer than this in plan are one node, mm.
 const SAME_NODE_MM: f64 = 1.0;
 
@@ -138,6 +141,7 @@ struct Builder<'a> {
     plan: BodyPlan,
     nodes: Vec<Node>,
     level: f64,
+    index: usize,
 }
 
 /// Plans one body.
@@ -145,7 +149,7 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
     let Some(body) = input.bodies.get(index) else {
         return Err(GeometryError::Input(format!("there is no body {index}")));
     };
-    let mut b = Builder { input, plan: BodyPlan::default(), nodes: Vec::new(), level: body.level_mm };
+    let mut b = Builder { input, plan: BodyPlan::default(), nodes: Vec::new(), level: body.level_mm, index };
     for eye in &body.eyes {
         b.add_eye(eye, &body.name);
     }
@@ -225,24 +229,14 @@ impl Builder<'_> {
 
     fn add_eye(&mut self, eye: &Eye, name: &str) {
         let shape = self.eye_shape(eye);
-        let axis = self.axis();
-        let slot = Slot::bar(
-            shape.center,
-            shape.center,
-            axis,
-            shape.radius,
-            shape.half_height - BOSS_BELOW_MM,
-            ROUND_MM,
-        );
-        self.push(Role::Eye(eye.joint), slot);
-        let joint_level = eye.point.dot(&axis);
-        if (joint_level - self.level).abs() < 0.5 * self.input.height_mm {
+        let (center, half) = (shape.center, shape.half_height - BOSS_BELOW_MM);
+        let level = center.dot(&self.axis());
+        if (eye.point.dot(&self.axis()) - self.level).abs() < 0.5 * self.input.height_mm {
+            let slot = Slot::bar(center, center, self.axis(), shape.radius, half, ROUND_MM);
+            self.push(Role::Eye(eye.joint), slot);
             self.node(eye.point, Some(shape));
         } else {
-            let foot = self.at_level(&eye.point, self.level);
-            self.riser(foot, shape.center, shape.radius - BOSS_EXTRA_MM);
-            // The boss at the foot is as wide as the eye: a bore may pass through it.
-            self.boss(foot, shape.radius);
+            self.column(Role::Eye(eye.joint), &eye.point, (level - half, level + half), shape.radius);
             self.node(eye.point, None);
         }
         self.bore(eye, &shape, name);
@@ -320,33 +314,40 @@ impl Builder<'_> {
             Role::Stub(index),
             Slot::bar(nose, root, axis, radius, half_height.max(0.1), STUB_ROUND_MM),
         );
-        let top = self.at_level(&root, level);
-        self.boss(top, self.boss_radius());
-        let foot = self.at_level(&root, self.level);
-        if (level - self.level).abs() >= 0.5 * self.input.height_mm {
-            self.riser(foot, top, self.bar_radius());
-            self.boss(foot, self.boss_radius());
+        if (level - self.level).abs() < 0.5 * self.input.height_mm {
+            self.boss(self.at_level(&root, self.level), self.boss_radius());
+        } else {
+            let half = self.half() - BOSS_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len());
+            self.column(Role::Riser, &root, (level - half, level + half), self.boss_radius());
         }
         self.node(root, None);
         Ok(())
     }
 
-    /// A full-height disc, unless one stands there already.
+    /// A full-height disc, unless something as wide stands there already.
     fn boss(&mut self, at: Vector3<f64>, radius: f64) {
+        let half = self.half() - BOSS_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len());
+        let axis = self.axis();
         let taken = self.plan.slots.iter().any(|(role, s)| {
-            *role == Role::Boss && (s.start - at).norm() < 1e-6 && s.radius_mm() >= radius - SPREAD_MM
+            let off = at - s.start;
+            let reach = s.half_height_mm + s.round_mm + SPREAD_MM;
+            !matches!(role, Role::Stub(_) | Role::Bar)
+                && (off - axis * off.dot(&axis)).norm() < SAME_NODE_MM
+                && off.dot(&axis).abs() + half <= reach
+                && s.radius_mm() >= radius - SPREAD_MM
         });
         if !taken {
-            let i = self.plan.slots.len();
-            let half = self.half() - BOSS_BELOW_MM - SPREAD_MM * spread(i);
-            self.push(Role::Boss, Slot::bar(at, at, self.axis(), radius, half, ROUND_MM));
+            self.push(Role::Boss, Slot::bar(at, at, axis, radius, half, ROUND_MM));
         }
     }
 
-    fn riser(&mut self, from: Vector3<f64>, to: Vector3<f64>, radius: f64) {
-        let half = (to - from).norm() / 2.0;
-        let middle = (from + to) / 2.0;
-        self.push(Role::Riser, Slot::bar(middle, middle, self.axis(), radius - 0.1, half, ROUND_MM));
+    /// One upright cylinder from the body's own layer through `span` (levels) in another layer: a
+    /// riser without steps.
+    fn column(&mut self, role: Role, at: &Vector3<f64>, span: (f64, f64), radius: f64) {
+        let half = self.half() - BOSS_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len());
+        let (low, high) = (span.0.min(self.level - half), span.1.max(self.level + half));
+        let middle = self.at_level(at, (low + high) / 2.0);
+        self.push(role, Slot::bar(middle, middle, self.axis(), radius, (high - low) / 2.0, ROUND_MM));
     }
 
     /// Bars between the nodes, in the body's own layer.
@@ -358,7 +359,7 @@ impl Builder<'_> {
             }
         }
         let points: Vec<Vector3<f64>> = self.nodes.iter().map(|n| n.at).collect();
-        let net = connect(&points);
+        let net = connect(&points, |p, q| self.blocked(p, q));
         if let Some(hub) = net.hub {
             self.boss(hub, self.boss_radius());
             self.nodes.push(Node { at: hub, own_eye: None });
@@ -366,6 +367,24 @@ impl Builder<'_> {
         for (i, j) in net.edges {
             self.bar(i, j, name);
         }
+    }
+
+    /// Whether a bar would run into a flexure, its own ones included, or into another body's stub.
+    fn blocked(&self, p: &Vector3<f64>, q: &Vector3<f64>) -> bool {
+        let bar = Slot::bar(*p, *q, self.axis(), self.bar_radius(), self.half() - BAR_BELOW_MM, ROUND_MM);
+        let hits = |s: &Slot| separation(&bar, s).gap_mm < self.input.clearance_mm;
+        self.input.flexures.iter().any(|f| {
+            let own = |at_end: bool| self.index == if at_end { f.bodies.1 } else { f.bodies.0 };
+            let free = |s: &Slot| {
+                [false, true].iter().all(|e| !own(*e) || (s.start - f.end_point(*e)).norm() > OWN_ROOT_MM)
+            };
+            f.slots().iter().filter(|s| free(s)).any(hits)
+                || [false, true].iter().filter(|e| !own(**e)).any(|e| {
+                    let (at, out) = (f.end_point(*e), f.outward(*e));
+                    let reach = STUB_FREE_MM + self.boss_radius();
+                    hits(&Slot::capsule(at, at + out * reach, STUB_RADIUS_MM.max(f.end_axes(*e).0)))
+                })
+        })
     }
 
     fn bar(&mut self, i: usize, j: usize, name: &str) {

@@ -18,15 +18,23 @@ const MEDIAN_STEPS: usize = 200;
 /// A hub must save this part of the chain's length: an equal chain looks and prints simpler.
 const HUB_SAVES: f64 = 0.02;
 
+/// What a blocked bar costs beyond its length, mm: more than any detour.
+const BLOCKED_MM: f64 = 1e4;
+
 /// Joins the points.
-pub fn connect(points: &[Vector3<f64>]) -> Net {
-    let chain = spanning_tree(points);
+///
+/// Bars that are `blocked` (they would run into something) are taken only where nothing else is
+/// left.
+pub fn connect(points: &[Vector3<f64>], blocked: impl Fn(&Vector3<f64>, &Vector3<f64>) -> bool) -> Net {
+    let cost =
+        |p: &Vector3<f64>, q: &Vector3<f64>| (p - q).norm() + if blocked(p, q) { BLOCKED_MM } else { 0.0 };
+    let chain = spanning_tree(points, &cost);
     if points.len() < 3 {
         return Net { hub: None, edges: chain };
     }
     let hub = median(points);
-    let star: f64 = points.iter().map(|p| (p - hub).norm()).sum();
-    let tree: f64 = chain.iter().map(|(i, j)| (points[*i] - points[*j]).norm()).sum();
+    let star: f64 = points.iter().map(|p| cost(p, &hub)).sum();
+    let tree: f64 = chain.iter().map(|(i, j)| cost(&points[*i], &points[*j])).sum();
     // A hub that falls on a node is that node: the chain then is the star.
     let apart = points.iter().map(|p| (p - hub).norm()).fold(f64::INFINITY, f64::min);
     if star < (1.0 - HUB_SAVES) * tree && apart > 2.0 {
@@ -36,7 +44,10 @@ pub fn connect(points: &[Vector3<f64>]) -> Net {
     Net { hub: None, edges: chain }
 }
 
-fn spanning_tree(points: &[Vector3<f64>]) -> Vec<(usize, usize)> {
+fn spanning_tree(
+    points: &[Vector3<f64>],
+    cost: &impl Fn(&Vector3<f64>, &Vector3<f64>) -> f64,
+) -> Vec<(usize, usize)> {
     let mut edges = Vec::new();
     let mut inside = vec![false; points.len()];
     if let Some(first) = inside.first_mut() {
@@ -46,7 +57,7 @@ fn spanning_tree(points: &[Vector3<f64>]) -> Vec<(usize, usize)> {
         let mut best: Option<(f64, usize, usize)> = None;
         for (i, p) in points.iter().enumerate().filter(|(i, _)| inside[*i]) {
             for (j, q) in points.iter().enumerate().filter(|(j, _)| !inside[*j]) {
-                let d = (p - q).norm();
+                let d = cost(p, q);
                 if best.is_none_or(|b| d < b.0) {
                     best = Some((d, i, j));
                 }
