@@ -26,7 +26,7 @@ pub fn check(common: &Common) -> u8 {
         Ok(opened) => opened,
         Err(why) => return unreadable(common, &why),
     };
-    let out = pipeline::check(&opened.request, &Compiler, &opened.folder);
+    let out = pipeline::check(&opened.request, &Compiler::default(), &opened.folder);
     render::report(&out.diagnostics, &out.sources, common.format);
     if let (Some(design), Format::Human) = (&out.design, common.format) {
         println!("{}: no errors", design.name);
@@ -40,7 +40,7 @@ pub fn ir(common: &Common) -> u8 {
         Ok(opened) => opened,
         Err(why) => return unreadable(common, &why),
     };
-    let out = pipeline::check(&opened.request, &Compiler, &opened.folder);
+    let out = pipeline::check(&opened.request, &Compiler::default(), &opened.folder);
     match &out.design {
         // The output is the design: findings go to the standard error in either format.
         Some(design) => {
@@ -73,7 +73,7 @@ pub fn simulate(arguments: &Simulate) -> u8 {
         return unreadable(common, &why);
     }
     let show = Show { rigid: arguments.rigid, poses: arguments.poses };
-    let (out, simulation) = pipeline::simulate(&opened.request, show, &Compiler, &opened.folder);
+    let (out, simulation) = pipeline::simulate(&opened.request, show, &Compiler::default(), &opened.folder);
     // The table may go to the standard output: findings never do.
     match common.format {
         Format::Human => render::show(&out.diagnostics, &out.sources),
@@ -114,7 +114,7 @@ pub fn build(arguments: &Build) -> u8 {
     };
     let cancel = stop_on_ctrl_c();
     let progress = Terminal::new(common.format == Format::Human);
-    let mut out = pipeline::build(&opened.request, &Compiler, &opened.folder, &progress, &cancel);
+    let mut out = pipeline::build(&opened.request, &Compiler::default(), &opened.folder, &progress, &cancel);
     progress.finish();
     let written = match write(&out, &arguments.out, &lock_path) {
         Ok(written) => written,

@@ -37,6 +37,8 @@ pub enum FileError {
     NotFound,
     /// It lies outside the design's folder (through a link).
     Outside,
+    /// It is larger than a source may be.
+    TooLarge,
     /// It is not UTF-8 text.
     NotText,
     /// Anything else, in words.
@@ -48,6 +50,7 @@ impl fmt::Display for FileError {
         match self {
             FileError::NotFound => f.write_str("the file does not exist"),
             FileError::Outside => f.write_str("it leads out of the design's folder"),
+            FileError::TooLarge => f.write_str("it is too large for a source"),
             FileError::NotText => f.write_str("it is not UTF-8 text"),
             FileError::Other(why) => f.write_str(why),
         }

@@ -47,7 +47,9 @@ impl SensitivityWorkspace {
         let parameters = model.rods.first().map_or(0, |r| r.dq_dp.ncols());
         let mut rhs = DMatrix::zeros(n + m, parameters);
         for (rod, system) in model.rods.iter().zip(&mut solver.systems) {
-            let columns = system.parameter_columns(&rod.rod).map_err(|_| SolveError::NoDerivatives)? * &rod.dq_dp;
+            let [a, b] = rod.bodies.map(|b| &equilibrium.state.poses[b]);
+            let columns = system.parameter_columns(&rod.rod, a, b);
+            let columns = columns.map_err(|_| SolveError::NoDerivatives)? * &rod.dq_dp;
             for (half, body) in rod.bodies.into_iter().enumerate() {
                 if let Some(first) = model.layout.bodies[body].first_dof {
                     let mut rows = rhs.rows_mut(first, 6);

@@ -7,7 +7,7 @@ use super::normal::Normal;
 use super::problem::{Problem, Trial};
 use super::run::Shared;
 use argmin::core::{
-    Error, IterState, KV, Problem as Counted, Solver, State, TerminationReason, TerminationStatus,
+    Error, IterState, KV, Problem as Counted, Solver, TerminationReason, TerminationStatus,
 };
 use nalgebra::DVector;
 

@@ -1,13 +1,12 @@
 //! The real stages: the only place where the pipeline touches elaboration, kinematics, equilibrium,
 //! optimisation and geometry.
 
-use super::files::Files;
 use super::progress::Iteration;
 use super::report::Artefact;
 use super::solids;
 use super::stages::{Checked, Failed, Simulation, Solved, Stages};
 use crate::diagnostic::Diagnostic;
-use crate::elaborate::{Options, elaborate};
+use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
 use crate::emit::stl::stl_bytes;
 use crate::equilibrium::{Cycle, Layout, Model, ModelError, SweepError, sweep};

@@ -2,7 +2,6 @@
 //! files come in through [`Files`], artefacts go out as names and bytes, time and threads come from outside.
 
 mod compiler;
-mod files;
 mod measure;
 mod progress;
 mod report;
@@ -10,7 +9,6 @@ mod solids;
 mod stages;
 
 pub use compiler::{Compiler, EDGES};
-pub use files::{FileError, Files};
 pub use measure::{aggregate, check_requirements, is_closed, measure};
 pub use progress::{Iteration, Progress, Stage};
 pub use report::{
@@ -20,6 +18,7 @@ pub use report::{
 pub use stages::{Checked, Failed, Simulation, Solved, Stages};
 
 use crate::diagnostic::{Diagnostic, Severity};
+pub use crate::elaborate::{FileError, Files};
 use crate::emit::arduino::Sketch;
 use crate::emit::lock::{Lock, LockState};
 use crate::ir::{Design, ExportKind, Solution};

@@ -1,10 +1,10 @@
 //! The stages as the pipeline sees them: what goes in, what comes out, nothing of how.
 //! [`Compiler`](super::Compiler) is the real thing; tests put small mechanisms with known answers in its place.
 
-use super::files::Files;
 use super::progress::Iteration;
 use super::report::Artefact;
 use crate::diagnostic::{Diagnostic, SourceMap};
+use crate::elaborate::Files;
 use crate::emit::csv::MotionTable;
 use crate::ir::{Design, Solution};
 use std::sync::atomic::AtomicBool;
