@@ -14,25 +14,19 @@ fn run_with(text: &str, options: &Options) -> Elaborated {
     elaborate("main.mech", &files, options)
 }
 
+
 #[test]
 fn dump() {
-    let e = run(CHEBYSHEV);
+    let text = std::fs::read_to_string(std::env::var("MECH").unwrap()).unwrap();
+    let e = run(&text);
     for d in &e.diagnostics {
-        println!("{d:#?}");
+        let o = d.labels[0].at;
+        let f = &e.sources.files[o.file as usize];
+        let line = f.text[..o.start as usize].matches('\n').count() + 1;
+        println!("{}:{} {} {} [{}] «{}» help={:?}", f.name, line, d.code, d.message, d.labels[0].text, &f.text[o.start as usize..o.end as usize], d.help);
+        for l in &d.labels[1..] {
+            let f = &e.sources.files[l.at.file as usize];
+            println!("      «{}» {}", &f.text[l.at.start as usize..l.at.end as usize], l.text);
+        }
     }
-    let d = e.design.unwrap();
-    let start: Vec<f64> = d.free.iter().map(|f| f.start).collect();
-    let v = d.exprs.evaluate(&start);
-    for b in &d.bodies {
-        println!(
-            "{} {:?}",
-            b.name,
-            b.skeleton.iter().map(|p| (p.name.clone(), v.point(p.position))).collect::<Vec<_>>()
-        );
-    }
-    for f in &d.free {
-        println!("{} {} {} {} {}", f.path, f.unit, f.start, f.lower, f.upper);
-    }
-    println!("{} nodes", d.exprs.nodes.len());
-    println!("{:?} {:?} {:?} {:?}", d.material, d.process, d.layers, d.requirements);
 }

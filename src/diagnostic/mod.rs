@@ -1,6 +1,9 @@
 //! One plain diagnostic for every stage. Renderers (terminal, JSON) live beside it, one a file;
 //! nothing here knows how a finding is shown.
 
+pub mod json;
+pub mod terminal;
+
 use serde::{Deserialize, Serialize};
 
 /// A byte range in one source file. Opaque to the numerical stages: they carry it so that a

@@ -12,7 +12,7 @@ use crate::diagnostic::{Diagnostic, Origin};
 use crate::ir::expr::{ExprGraph, ExprId, Node};
 use crate::ir::{ExprPoint, FreeVariable};
 use crate::syntax::ast::{BinaryOp, Expr, ExprKind, Ident, UnitFactor};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 
 /// A diagnostic has been given; nothing more is to be said.
@@ -27,6 +27,8 @@ pub type Outcome<T> = Result<T, Failed>;
 const MAX_DEPTH: usize = 200;
 /// Most nodes of the expression graph; Jansen's leg needs about 3,000.
 const MAX_NODES: usize = 20_000;
+/// Most expressions evaluated, templates counted at each use; Jansen's leg needs about 5,000.
+const MAX_WORK: usize = 400_000;
 /// Most free variables.
 const MAX_FREE: usize = 4_000;
 
@@ -71,7 +73,14 @@ pub struct Evaluator<'a> {
     pub(super) settable: BTreeSet<String>,
     pub(super) busy: Vec<(Key, String, Origin)>,
     depth: usize,
+    work: usize,
+    /// The limits are exceeded: this has been said, nothing more is evaluated.
+    full: bool,
     paths: BTreeSet<String>,
+    /// Where each node is: only looked up, never listed.
+    interned: HashMap<(u8, u64, u64), ExprId>,
+    /// Values of all nodes at the start values of the free variables, and those start values.
+    starts: (Vec<f64>, Vec<f64>),
 }
 
 impl<'a> Evaluator<'a> {
@@ -89,7 +98,11 @@ impl<'a> Evaluator<'a> {
             settable: BTreeSet::new(),
             busy: Vec::new(),
             depth: 0,
+            work: 0,
+            full: false,
             paths: BTreeSet::new(),
+            interned: HashMap::new(),
+            starts: (Vec::new(), Vec::new()),
         }
     }
 
@@ -101,13 +114,21 @@ impl<'a> Evaluator<'a> {
 
     /// Adds a node; errors when the graph is full or a constant is not finite.
     pub(super) fn node(&mut self, node: Node, at: Origin) -> Outcome<ExprId> {
-        if self.exprs.nodes.len() >= MAX_NODES {
-            return self.fail(
-                Diagnostic::error(codes::TOO_LARGE, "the design has too many expressions", at)
-                    .help(format!("at most {MAX_NODES} after folding constants")),
-            );
-        }
-        let id = self.exprs.push(node);
+        let node = self.exprs.fold(node);
+        let key = node_key(&node);
+        let id = match self.interned.get(&key) {
+            Some(id) => *id,
+            None => {
+                if self.exprs.nodes.len() >= MAX_NODES {
+                    return self.too_large(at);
+                }
+                self.exprs.nodes.push(node);
+                self.exprs.extend_values(&mut self.starts.0, &self.starts.1);
+                let id = ExprId((self.exprs.nodes.len() - 1) as u32);
+                self.interned.insert(key, id);
+                id
+            }
+        };
         match self.exprs.as_constant(id) {
             Some(v) if !v.is_finite() => self.fail(
                 Diagnostic::error(codes::NOT_FINITE, "this is not a finite number", at)
@@ -115,6 +136,22 @@ impl<'a> Evaluator<'a> {
             ),
             _ => Ok(id),
         }
+    }
+
+    fn too_large<T>(&mut self, at: Origin) -> Outcome<T> {
+        if std::mem::replace(&mut self.full, true) {
+            return Err(Failed);
+        }
+        self.fail(
+            Diagnostic::error(codes::TOO_LARGE, "the design is too large to be worked out", at).help(format!(
+                "at most {MAX_NODES} different expressions and {MAX_WORK} evaluated ones, templates counted at each use"
+            )),
+        )
+    }
+
+    /// Value of a node at the start values of the free variables.
+    pub(super) fn start_value(&self, id: ExprId) -> f64 {
+        self.starts.0.get(id.0 as usize).copied().unwrap_or(f64::NAN)
     }
 
     pub(super) fn constant(&mut self, v: f64, at: Origin) -> Outcome<ExprId> {
@@ -128,6 +165,10 @@ impl<'a> Evaluator<'a> {
                 Diagnostic::error(codes::TOO_LARGE, "expressions are nested too deeply", e.at)
                     .help(format!("at most {MAX_DEPTH} levels, counted through the names they use")),
             );
+        }
+        self.work += 1;
+        if self.work > MAX_WORK || self.full {
+            return self.too_large(e.at);
         }
         self.depth += 1;
         let value = self.eval_inner(env, e);
@@ -589,14 +630,14 @@ impl<'a> Evaluator<'a> {
         let [start_value, lower_value, upper_value] = bounds;
         if !(lower_value < upper_value) {
             return self.fail(
-                Diagnostic::error(codes::FREE_BOUNDS, "the lower bound is not below the upper one", at)
+                Diagnostic::error(codes::FREE_BOUNDS, format!("the lower bound of `{path}` is not below the upper one"), at)
                     .also(lower.at, self.show(lower_value, dim))
                     .also(upper.at, self.show(upper_value, dim)),
             );
         }
         if !(lower_value..=upper_value).contains(&start_value) {
             return self.fail(
-                Diagnostic::error(codes::FREE_BOUNDS, "the bounds do not contain the start", at)
+                Diagnostic::error(codes::FREE_BOUNDS, format!("the bounds of `{path}` do not contain its start"), at)
                     .also(start.at, format!("starts at {}", self.show(start_value, dim)))
                     .also(lower.at, self.show(lower_value, dim))
                     .also(upper.at, self.show(upper_value, dim))
@@ -611,6 +652,7 @@ impl<'a> Evaluator<'a> {
             ));
         }
         let index = self.free.len() as u32;
+        self.starts.1.push(start_value);
         self.free.push(FreeVariable {
             path,
             unit: dim.unit(),
@@ -696,6 +738,31 @@ impl<'a> Evaluator<'a> {
         let index = s.locals.len() - 1;
         s.index.insert(name, index);
         Some(index)
+    }
+}
+
+/// Equal nodes have equal keys.
+fn node_key(node: &Node) -> (u8, u64, u64) {
+    let id = |a: &ExprId| u64::from(a.0);
+    match node {
+        Node::Const(v) => (0, v.to_bits(), 0),
+        Node::Free(i) => (1, u64::from(*i), 0),
+        Node::Neg(a) => (2, id(a), 0),
+        Node::Add(a, b) => (3, id(a), id(b)),
+        Node::Sub(a, b) => (4, id(a), id(b)),
+        Node::Mul(a, b) => (5, id(a), id(b)),
+        Node::Div(a, b) => (6, id(a), id(b)),
+        Node::Powi(a, n) => (7, id(a), u64::from(n.unsigned_abs()) << 1 | u64::from(*n < 0)),
+        Node::Sqrt(a) => (8, id(a), 0),
+        Node::Sin(a) => (9, id(a), 0),
+        Node::Cos(a) => (10, id(a), 0),
+        Node::Tan(a) => (11, id(a), 0),
+        Node::Atan2(a, b) => (12, id(a), id(b)),
+        Node::Asin(a) => (13, id(a), 0),
+        Node::Acos(a) => (14, id(a), 0),
+        Node::Min(a, b) => (15, id(a), id(b)),
+        Node::Max(a, b) => (16, id(a), id(b)),
+        Node::Abs(a) => (17, id(a), 0),
     }
 }
 

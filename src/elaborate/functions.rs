@@ -266,8 +266,10 @@ impl<'a> Evaluator<'a> {
 
     /// (r cos φ, r sin φ)
     pub(super) fn polar_components(&mut self, r: ExprId, phi: ExprId, at: Origin) -> Outcome<[ExprId; 2]> {
-        let c = self.node(Node::Cos(phi), at)?;
-        let s = self.node(Node::Sin(phi), at)?;
+        let (c, s) = match self.exprs.as_constant(phi).and_then(quarter_turn) {
+            Some((c, s)) => (self.constant(c, at)?, self.constant(s, at)?),
+            None => (self.node(Node::Cos(phi), at)?, self.node(Node::Sin(phi), at)?),
+        };
         Ok([self.node(Node::Mul(r, c), at)?, self.node(Node::Mul(r, s), at)?])
     }
 
@@ -304,15 +306,6 @@ impl<'a> Evaluator<'a> {
         let p = self.pairwise(a, b, at, Node::Mul)?;
         let xy = self.node(Node::Add(p[0], p[1]), at)?;
         self.node(Node::Add(xy, p[2]), at)
-    }
-
-    /// Value of a node at the start values of the free variables.
-    pub(super) fn start_value(&self, id: ExprId) -> f64 {
-        if let Some(v) = self.exprs.as_constant(id) {
-            return v;
-        }
-        let p: Vec<f64> = self.free.iter().map(|f| f.start).collect();
-        self.exprs.values(&p).get(id.0 as usize).copied().unwrap_or(f64::NAN)
     }
 
     /// `meet(circle(A, r), circle(B, s), left|right)`: with d = |AB|, the foot of the common chord lies
@@ -418,6 +411,20 @@ impl<'a> Evaluator<'a> {
                 .help("change a radius or move a centre"),
         )
     }
+}
+
+/// Cosine and sine of a multiple of a right angle, exactly: `polar(r, 90 deg)` is (0, r), not (1e-15, r).
+fn quarter_turn(phi: f64) -> Option<(f64, f64)> {
+    let turns = phi / std::f64::consts::FRAC_PI_2;
+    if (turns - turns.round()).abs() > 4.0 * f64::EPSILON * turns.abs() || turns.abs() > 1e6 {
+        return None;
+    }
+    Some(match (turns.round() as i64).rem_euclid(4) {
+        0 => (1.0, 0.0),
+        1 => (0.0, 1.0),
+        2 => (-1.0, 0.0),
+        _ => (0.0, -1.0),
+    })
 }
 
 fn ascii(name: &str) -> &str {

@@ -70,6 +70,8 @@ impl<'a> Evaluator<'a> {
     ) -> Outcome<Vec<Drive>> {
         let mut out: Vec<Drive> = Vec::new();
         let mut ok = Ok(());
+        let at = sheet.drives.get(1).map(|d| d.at).or(sheet.rests.get(1).map(|r| r.2)).unwrap_or_default();
+        self.limit(sheet.drives.len().max(sheet.rests.len()), "drives", at)?;
         for text in &sheet.drives {
             match self.drive(scope, module, text, s, &out) {
                 Ok(d) => out.push(d),
@@ -77,6 +79,11 @@ impl<'a> Evaluator<'a> {
             }
         }
         for (i, (name, value, at)) in sheet.rests.iter().enumerate() {
+            if sheet.later && !self.is_declared(scope, name) {
+                // It may be the value of a statement that is not available yet.
+                ok = Err(Failed);
+                continue;
+            }
             let rest = self.rest(scope, name, value);
             let earlier = sheet.rests.iter().take(i).find(|(n, ..)| n.node == name.node);
             if let Some((_, _, first)) = earlier {
@@ -115,6 +122,10 @@ impl<'a> Evaluator<'a> {
             }
         }
         ok.map(|()| out)
+    }
+
+    fn is_declared(&self, scope: usize, name: &Ident) -> bool {
+        self.scopes.get(scope).is_some_and(|s| s.index.contains_key(&name.node))
     }
 
     fn rest(&mut self, scope: usize, name: &Ident, value: &'a Expr) -> Outcome<f64> {
@@ -340,6 +351,9 @@ impl<'a> Evaluator<'a> {
                 );
             }
             [None, None] => {
+                if let Some(outer) = output_query(text.left).or(output_query(text.right)) {
+                    return self.later(codes::LATER_TERM, &format!("{}(OUTPUT)", outer.node), outer.at);
+                }
                 if matches!(text.left.kind, ExprKind::Broken) || matches!(text.right.kind, ExprKind::Broken) {
                     return Err(Failed);
                 }
@@ -506,6 +520,17 @@ struct Query<'a> {
     inner: &'a Ident,
     inner_arguments: &'a [Argument],
     time: Option<&'a Expr>,
+}
+
+/// `span(curl)`: the query of an `output`, which this version does not have.
+fn output_query(e: &Expr) -> Option<&Ident> {
+    match &e.kind {
+        ExprKind::Call { function, arguments } if matches!(function.node.as_str(), "span" | "mean") => {
+            let [only] = arguments.as_slice() else { return None };
+            matches!(only.value.kind, ExprKind::Name(_)).then_some(function)
+        }
+        _ => None,
+    }
 }
 
 /// Recognises a query by the quantity it asks for.

@@ -17,9 +17,13 @@ const MAX_IMPORT_DEPTH: usize = 32;
 const MAX_FILES: usize = 128;
 /// Largest source file, bytes. The samples have about 3 kB.
 const MAX_FILE_BYTES: usize = 1 << 20;
+/// Most bytes of all files together.
+const MAX_TOTAL_BYTES: usize = 4 << 20;
 
 /// A parsed file and what it sees of others.
 pub struct Module {
+    /// Its index in the source map.
+    pub file_id: u32,
     /// Path shown to the user.
     pub path: String,
     /// Its tree.
@@ -30,6 +34,8 @@ pub struct Module {
     pub names: BTreeMap<String, Visible>,
     /// Per `use`, whether it has been found.
     pub imported: Vec<bool>,
+    /// A file could not be imported: names that seem unknown may come from it.
+    pub lacks_file: bool,
 }
 
 /// A top-level name seen in a module.
@@ -78,7 +84,7 @@ impl Program {
 /// Reads `root` and its imports.
 pub fn load(root: &str, files: &dyn Files, sources: &mut SourceMap, out: &mut Vec<Diagnostic>) -> Program {
     let mut loader =
-        Loader { files, sources, out, program: Program::default(), done: BTreeMap::new(), chain: Vec::new() };
+        Loader { files, sources, out, program: Program::default(), done: BTreeMap::new(), total_bytes: 0, chain: Vec::new() };
     loader.program.root = loader.module(Key::File(root.to_string()), None, Origin::default());
     loader.program
 }
@@ -105,6 +111,8 @@ struct Loader<'a> {
     program: Program,
     /// Finished modules; none where reading failed.
     done: BTreeMap<Key, Option<usize>>,
+    /// Length of all texts read.
+    total_bytes: usize,
     /// Files being read, with the `use` that asked for each.
     chain: Vec<(Key, Origin)>,
 }
@@ -131,6 +139,10 @@ impl Loader<'_> {
         let text = match self.text(&key, use_at) {
             Ok(text) => text,
             Err(diagnostic) => {
+                if use_at.is_none() {
+                    // The root: the place of this finding must exist.
+                    self.sources.add(key.shown(), "");
+                }
                 self.out.push(*diagnostic);
                 self.done.insert(key, None);
                 return None;
@@ -150,13 +162,13 @@ impl Loader<'_> {
             );
         }
         self.chain.push((key.clone(), at));
-        let index = self.build(&key, file, broken);
+        let index = self.build(&key, file_id, file, broken);
         self.chain.pop();
         self.done.insert(key, Some(index));
         Some(index)
     }
 
-    fn text(&self, key: &Key, use_at: Option<Origin>) -> Result<String, Box<Diagnostic>> {
+    fn text(&mut self, key: &Key, use_at: Option<Origin>) -> Result<String, Box<Diagnostic>> {
         let at = use_at.unwrap_or_default();
         let unreadable = |why: &str| {
             Box::new(
@@ -200,10 +212,14 @@ impl Loader<'_> {
         if text.len() > MAX_FILE_BYTES {
             return Err(unreadable("the file is larger than 1 MiB"));
         }
+        self.total_bytes += text.len();
+        if self.total_bytes > MAX_TOTAL_BYTES {
+            return Err(unreadable("all files together are larger than 4 MiB"));
+        }
         Ok(text)
     }
 
-    fn build(&mut self, key: &Key, file: ast::File, broken: bool) -> usize {
+    fn build(&mut self, key: &Key, file_id: u32, file: ast::File, broken: bool) -> usize {
         let mut names: BTreeMap<String, Visible> = BTreeMap::new();
         // The own index is not known before the imports are read: patched below.
         const OWN: usize = usize::MAX;
@@ -220,15 +236,20 @@ impl Loader<'_> {
             }
         }
         let mut imported = vec![false; file.uses.len()];
+        let mut lacks_file = false;
         for (u, item) in file.uses.iter().enumerate() {
             let (target, only) = match self.resolve(key, &item.target) {
                 Ok(found) => found,
                 Err(d) => {
+                    lacks_file |= matches!(item.target, UseTarget::File(_));
                     self.out.push(*d);
                     continue;
                 }
             };
-            let Some(m) = self.module(target, Some(item.at), item.at) else { continue };
+            let Some(m) = self.module(target, Some(item.at), item.at) else {
+                lacks_file |= only.is_none();
+                continue;
+            };
             if let Some(flag) = imported.get_mut(u) {
                 *flag = true;
             }
@@ -287,7 +308,7 @@ impl Loader<'_> {
                 v.item.0 = index;
             }
         }
-        self.program.modules.push(Module { path: key.shown(), file, broken, names, imported });
+        self.program.modules.push(Module { file_id, path: key.shown(), file, broken, names, imported, lacks_file });
         index
     }
 

@@ -26,6 +26,11 @@ impl<'a> Evaluator<'a> {
         self.finish_unknown(d, name, &candidates)
     }
 
+    /// A suggestion, unless so much is wrong already that looking for one takes too long.
+    fn near<'n>(&self, name: &str, candidates: impl IntoIterator<Item = &'n str>) -> Option<String> {
+        if self.out.len() > super::MAX_FINDINGS { None } else { suggestion(name, candidates) }
+    }
+
     /// A name that should be an item of a kind (`material`, `flexure`, …).
     pub(super) fn unknown_item<T>(&mut self, scope: usize, name: &Ident, kind: &str) -> Outcome<T> {
         let module = self.scopes.get(scope).map_or(0, |s| s.module);
@@ -40,6 +45,9 @@ impl<'a> Evaluator<'a> {
     }
 
     fn finish_unknown<T>(&mut self, d: Diagnostic, name: &Ident, candidates: &[String]) -> Outcome<T> {
+        if self.may_be_imported(d.labels.first().map_or(0, |l| l.at.file), name) {
+            return Err(super::eval::Failed);
+        }
         if name.node.starts_with('_')
             && let Some((place, path)) = self.private(name)
         {
@@ -52,12 +60,24 @@ impl<'a> Evaluator<'a> {
         let in_std = std_modules().into_iter().find(|m| m.rsplit('.').next() == Some(name.node.as_str()));
         let d = match in_std {
             Some(module) => d.help(format!("add `use std.{module}` at the top of the file")),
-            None => match suggestion(&name.node, candidates.iter().map(String::as_str)) {
+            None => match self.near(&name.node, candidates.iter().map(String::as_str)) {
                 Some(near) => d.help(format!("did you mean `{near}`?")),
                 None => d.label("not found here"),
             },
         };
         self.fail(d)
+    }
+
+    /// Whether an import that failed might have brought this name: then it has been reported.
+    fn may_be_imported(&self, file: u32, name: &Ident) -> bool {
+        use crate::syntax::ast::UseTarget;
+        self.program.modules.iter().filter(|m| m.file_id == file).any(|m| {
+            m.lacks_file
+                || m.file.uses.iter().zip(&m.imported).any(|(u, found)| {
+                    matches!(&u.target, UseTarget::Std(path)
+                        if !found && path.last().is_some_and(|p| p.node == name.node))
+                })
+        })
     }
 
     fn private(&self, name: &Ident) -> Option<(Origin, String)> {
@@ -91,7 +111,7 @@ impl<'a> Evaluator<'a> {
         }
         let d =
             Diagnostic::error(codes::UNKNOWN_NAME, format!("there is no {kind} `{}`", name.node), name.at);
-        let d = match suggestion(&name.node, map.keys().map(String::as_str)) {
+        let d = match self.near(&name.node, map.keys().map(String::as_str)) {
             Some(near) => d.help(format!("did you mean `{near}`?")),
             None if map.is_empty() => d.help(format!("the mechanism has no {kind}")),
             None => d.help(format!(

@@ -119,7 +119,7 @@ impl<'a> Evaluator<'a> {
 
     /// Reports a statement that every mechanism needs.
     fn missing<T>(&mut self, sheet: &Sheet<'a>, m: &Mechanism, what: &str, example: &str) -> Option<T> {
-        if !sheet.broken {
+        if !sheet.broken && !sheet.later {
             self.out.push(
                 Diagnostic::error(
                     codes::MISSING,

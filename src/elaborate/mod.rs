@@ -159,6 +159,9 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
     Elaborated { design, sources, diagnostics }
 }
 
+/// Most findings that are told one by one.
+const MAX_FINDINGS: usize = 100;
+
 /// Sorts by place and drops repetitions: a template used twice says a thing once.
 fn tidy(diagnostics: &mut Vec<Diagnostic>) {
     let place =
@@ -174,6 +177,17 @@ fn tidy(diagnostics: &mut Vec<Diagnostic>) {
         {
             kept.push(d);
         }
+    }
+    if kept.len() > MAX_FINDINGS {
+        let more = kept.len() - MAX_FINDINGS;
+        let place = kept.get(MAX_FINDINGS).and_then(|d| d.labels.first()).map(|l| l.at).unwrap_or_default();
+        let text = format!("{more} more findings from here on are not shown");
+        let error = kept.iter().skip(MAX_FINDINGS).any(Diagnostic::is_error);
+        kept.truncate(MAX_FINDINGS);
+        kept.push(match error {
+            true => Diagnostic::error(codes::TOO_LARGE, text, place),
+            false => Diagnostic::warning(codes::TOO_LARGE, text, place),
+        });
     }
     *diagnostics = kept;
 }

@@ -151,6 +151,7 @@ impl<'a> Evaluator<'a> {
     fn check_record(&mut self, item: ItemRef) -> Outcome<&'a Record> {
         let Some(record) = self.record(item) else { return Err(super::eval::Failed) };
         let known = fields_of(&record.kind.node).unwrap_or_default();
+        self.limit(record.fields.len(), "fields", record.name.at)?;
         let mut ok = true;
         for (i, (name, _)) in record.fields.iter().enumerate() {
             if record.fields.iter().take(i).any(|(n, _)| n.node == name.node) {

@@ -57,6 +57,8 @@ pub struct Sheet<'a> {
     pub exports: Vec<&'a Expr>,
     /// Something could not be understood: what seems missing may be there.
     pub broken: bool,
+    /// Something is not available yet: it may be what seems missing.
+    pub later: bool,
 }
 
 impl<'a> Evaluator<'a> {
@@ -172,6 +174,7 @@ impl<'a> Evaluator<'a> {
                     .help("declare `flexure NAME replaces hinge { … }` and use it with `as NAME`"),
             ),
             StatementKind::Later { keyword } => {
+                sheet.later = true;
                 let _: Result<(), _> = self.later(codes::LATER_STATEMENT, &keyword.node, keyword.at);
             }
             StatementKind::Broken => sheet.broken = true,

@@ -28,6 +28,8 @@ pub struct Structure<'a> {
     pub body_index: BTreeMap<String, usize>,
     pub joints: Vec<Joint>,
     pub joint_index: BTreeMap<String, usize>,
+    /// A body or joint was wrong: what seems to be missing may be there.
+    pub incomplete: bool,
     /// The statement of each joint.
     pub texts: Vec<&'a ast::Joint>,
 }
@@ -62,7 +64,7 @@ impl<'a> Evaluator<'a> {
         }
         // The first ground body is body 0, whatever the order of the text.
         let first_ground = sheet.bodies.iter().position(|b| b.ground);
-        if first_ground.is_none() && !sheet.broken {
+        if first_ground.is_none() && !sheet.broken && !sheet.later {
             self.out.push(
                 Diagnostic::error(codes::NO_GROUND, "the mechanism has no ground body", origin)
                     .help("declare the fixed body with `ground NAME { … }`"),
@@ -82,16 +84,20 @@ impl<'a> Evaluator<'a> {
                 s.joint_index.insert(joint.name.clone(), s.joints.len());
                 s.joints.push(joint);
                 s.texts.push(text);
+            } else {
+                s.incomplete = true;
             }
         }
         self.complete_skeletons(&mut s);
-        self.check_end_frames(&s);
+        if !s.incomplete && !sheet.broken && !sheet.later {
+            self.check_end_frames(&s);
+        }
         s
     }
 
     fn body(&mut self, scope: usize, text: &BodyText<'a>) -> Outcome<Body> {
         let mut skeleton: Vec<NamedPoint> = Vec::new();
-        let mut ok = true;
+        self.limit(text.points.len(), "points of a body", text.at)?;
         for name in text.points {
             if skeleton.iter().any(|p| p.name == name.node) {
                 self.out.push(Diagnostic::error(
@@ -101,14 +107,12 @@ impl<'a> Evaluator<'a> {
                 ));
                 continue;
             }
-            match self.named_point(scope, name) {
-                Ok(position) => skeleton.push(NamedPoint { name: name.node.clone(), position }),
-                Err(Failed) => ok = false,
+            // A body with a bad point is kept, so that what refers to it is not reported too.
+            if let Ok(position) = self.named_point(scope, name) {
+                skeleton.push(NamedPoint { name: name.node.clone(), position });
             }
         }
         let layer = self.layer(scope, text.layer);
-        // A body with a bad point is kept, so that what refers to it is not reported too.
-        let _ = ok;
         Ok(Body {
             name: text.name.node.clone(),
             ground: text.ground,
@@ -126,6 +130,14 @@ impl<'a> Evaluator<'a> {
                 self.wrong_kind(name, &is, "a point")
             }
         }
+    }
+
+    /// Lists that are compared pair by pair must be short.
+    pub(super) fn limit(&mut self, n: usize, what: &str, at: Origin) -> Outcome<()> {
+        if n <= MAX_PARTS {
+            return Ok(());
+        }
+        self.fail(Diagnostic::error(codes::TOO_LARGE, format!("more than {MAX_PARTS} {what}"), at))
     }
 
     fn layer(&mut self, scope: usize, e: Option<&'a Expr>) -> Outcome<i32> {
@@ -167,7 +179,9 @@ impl<'a> Evaluator<'a> {
         planar: bool,
     ) -> Outcome<Joint> {
         let mut bodies = Vec::new();
-        let mut ok = self.joint_kind(&text.kind);
+        self.limit(text.bodies.len() + text.into.len(), "bodies of a joint", at)?;
+        self.joint_kind(&text.kind)?;
+        let mut ok = Ok(());
         for name in &text.bodies {
             match self.thing(scope, &s.body_index, name, "body") {
                 Ok(i) if bodies.contains(&i) => {

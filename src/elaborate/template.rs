@@ -51,6 +51,7 @@ impl<'a> Evaluator<'a> {
                 .also(flexure.replaces.at, "declared here"),
             );
         }
+        self.limit(text.overrides.len(), "overrides", text.name.at)?;
         let inner = self.scope(owner);
         self.given_names(inner, site, text.name.at)?;
         let mut ok = self.check_overrides(flexure, text);

@@ -112,7 +112,8 @@ impl ExprGraph {
         self.as_constant(id).is_none()
     }
 
-    fn fold(&self, node: Node) -> Node {
+    /// The node itself, or the constant it comes to when its operands are constant.
+    pub(crate) fn fold(&self, node: Node) -> Node {
         let operands = operands(&node);
         if matches!(node, Node::Const(_) | Node::Free(_)) {
             return node;
@@ -130,7 +131,13 @@ impl ExprGraph {
     /// Value of every node at the free variables `p`.
     pub fn values(&self, p: &[f64]) -> Vec<f64> {
         let mut out: Vec<f64> = Vec::with_capacity(self.nodes.len());
-        for node in &self.nodes {
+        self.extend_values(&mut out, p);
+        out
+    }
+
+    /// Appends the values of the nodes that `out` does not have yet, at the free variables `p`.
+    pub fn extend_values(&self, out: &mut Vec<f64>, p: &[f64]) {
+        for node in self.nodes.iter().skip(out.len()) {
             let v = match node {
                 Node::Const(v) => *v,
                 Node::Free(i) => p[*i as usize],
@@ -143,7 +150,6 @@ impl ExprGraph {
             };
             out.push(v);
         }
-        out
     }
 
     /// Values and derivatives (forward mode) of every node at the free variables `p`.

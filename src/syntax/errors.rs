@@ -20,7 +20,7 @@
 use super::grammar::{Failure, Wanted, why};
 use super::lower::Lower;
 use super::tree::{Kind, Node};
-use super::words::{ITEM_WORDS, STATEMENT_WORDS, form, nearest};
+use super::words::{COMMON_STATEMENTS, ITEM_WORDS, STATEMENT_WORDS, form, nearest};
 use crate::diagnostic::{Diagnostic, Origin};
 
 /// Broken parts that are looked into; looking costs as much as parsing them once more.
@@ -142,14 +142,17 @@ impl Lower<'_> {
         );
     }
 
-    /// Ends the count of broken parts.
+    /// Sorts what was found and keeps the first [`MAX_ERRORS`].
     pub(super) fn finish(&mut self) {
-        if self.recovery.count > MAX_ERRORS {
-            let message = format!("{} more errors are not shown", self.recovery.count - MAX_ERRORS);
-            let end = self.source.len();
-            self.report(Diagnostic::error("E0014", message, self.at(end, end)));
-        }
         self.diagnostics.sort_by_key(|d| d.labels.first().map_or(0, |l| l.at.start));
+        let untold = self.recovery.count.saturating_sub(MAX_ERRORS);
+        let more = untold + self.diagnostics.len().saturating_sub(MAX_ERRORS);
+        self.diagnostics.truncate(MAX_ERRORS);
+        if more > 0 {
+            let end = self.source.len();
+            let message = format!("{more} more errors are not shown");
+            self.report(Diagnostic::error("E0014", message, self.at(end, end)).help("mend the first ones"));
+        }
     }
 
     /// Counts a broken part; false if enough have been told.
@@ -188,7 +191,7 @@ impl Lower<'_> {
             let (length, found) = found(self.source, start);
             let message = format!("{} {what} starts with a keyword, found {found}", article(what));
             let at = self.at(start, start + length);
-            let help = format!("{}s start with one of: {}", what, known.join(", "));
+            let help = starts(what, known);
             self.report(Diagnostic::error("E0002", message, at).label("no keyword").help(help));
             return;
         }
@@ -197,7 +200,7 @@ impl Lower<'_> {
             Diagnostic::error("E0002", format!("no {what} starts with `{word}`"), at).label("not a keyword");
         let help = match nearest(word, known) {
             Some(near) => format!("did you mean `{near}`?"),
-            None => format!("{}s start with one of: {}", what, known.join(", ")),
+            None => starts(what, known),
         };
         self.report(diagnostic.help(help));
     }
@@ -217,18 +220,19 @@ impl Lower<'_> {
         let (length, found) = found(self.source, at);
         let place = self.at(at, at + length);
         let rest = self.source.get(at..).unwrap_or("");
-        if rest.starts_with('"') && expected.iter().all(|e| !e.contains("quotes") || unclosed(rest)) {
+        if rest.starts_with('"') && unclosed(rest) {
             let line = rest.lines().next().map_or(0, |l| l.trim_end().len());
-            if unclosed(rest) {
-                self.report(
-                    Diagnostic::error("E0012", "this text is not closed", self.at(at, at + line))
-                        .label("no `\"` follows on this line")
-                        .help("close it with `\"` on the same line"),
-                );
-                return;
-            }
+            self.report(
+                Diagnostic::error("E0012", "this text is not closed", self.at(at, at + line))
+                    .label("no `\"` follows on this line")
+                    .help("close it with `\"` on the same line"),
+            );
+            return;
         }
         if let Some((message, help)) = odd(rest) {
+            // A letter in a name: the whole word is meant.
+            let word = self.source.get(..at).map_or(at, |t| t.trim_end_matches(is_word).len());
+            let place = if rest.starts_with(is_word) { self.at(word, at + length) } else { place };
             self.report(Diagnostic::error("E0010", message, place).label("not understood").help(help));
             return;
         }
@@ -246,7 +250,9 @@ impl Lower<'_> {
         let rest = self.source.get(at..).unwrap_or("");
         let before = self.source.get(..at).unwrap_or("");
         let after_value = before.trim_end_matches([' ', '\t']);
-        if rest.starts_with('(') && after_value.ends_with(|c: char| c.is_ascii_alphanumeric() || c == ')') {
+        if rest.trim_start().starts_with('(')
+            && after_value.ends_with(|c: char| c.is_ascii_alphanumeric() || c == ')')
+        {
             return Some("write `*` between factors; a call has no space before its `(`".into());
         }
         if rest.starts_with("==") || rest.starts_with("=") && word == "require" {
@@ -299,6 +305,10 @@ impl Lower<'_> {
     fn odd_at(&self, at: usize) -> bool {
         odd(self.source.get(at..).unwrap_or("")).is_some()
     }
+}
+
+fn is_word(c: char) -> bool {
+    c.is_alphanumeric() || c == '_'
 }
 
 /// Byte offset of the comment on a line, if any.
@@ -371,8 +381,12 @@ fn found(source: &str, at: usize) -> (usize, String) {
     let rest = source.get(at..).unwrap_or("");
     let Some(c) = rest.chars().next() else { return (0, "the end of the file".into()) };
     let run = |f: &dyn Fn(char) -> bool| rest.find(|c| !f(c)).unwrap_or(rest.len());
-    if rest.trim_start_matches([' ', '\t']).starts_with("//") || "\n\r \t".contains(c) {
+    let after = rest.trim_start_matches([' ', '\t']);
+    if after.is_empty() || after.starts_with(['\n', '\r']) || after.starts_with("//") {
         return (0, "the end of the line".into());
+    }
+    if after.len() < rest.len() {
+        return (rest.len() - after.len(), "a space".into());
     }
     let length = match c {
         c if c.is_ascii_digit() => run(&|c| c.is_ascii_alphanumeric() || c == '.'),
@@ -394,6 +408,13 @@ fn list(items: &[String]) -> String {
         [only] => only.clone(),
         [first @ .., last] => format!("{} or {last}", first.join(", ")),
     }
+}
+
+/// The words a line may start with; of a long list the first, which are the common ones.
+fn starts(what: &str, known: &[&str]) -> String {
+    let more = if known.len() > COMMON_STATEMENTS { ", …" } else { "" };
+    let common: Vec<&str> = known.iter().take(COMMON_STATEMENTS).copied().collect();
+    format!("{what}s start with {}{more}", common.join(", "))
 }
 
 fn article(noun: &str) -> &'static str {

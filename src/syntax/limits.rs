@@ -1,5 +1,6 @@
 //! Limits checked before the grammar runs, so that no text can exhaust memory or the stack.
 
+use super::words;
 use crate::diagnostic::{Diagnostic, Origin};
 
 /// Largest file in bytes. The largest sample has 4 kB; a tree takes about 60 times its text.
@@ -48,6 +49,13 @@ fn too_deep(text: &str) -> Option<usize> {
                 }
             }
             b'/' if rest.first() == Some(&b'/') => at += to(b"\r\n").unwrap_or(rest.len()),
+            b'\n' | b'\r' => {
+                // No parenthesis reaches over a line that starts a statement.
+                if words::starts_statement(text.get(at + 1..).unwrap_or("")) {
+                    let inner = open.iter().rposition(|b| *b == b'{').map_or(0, |i| i + 1);
+                    open.truncate(inner);
+                }
+            }
             b'(' | b'{' => {
                 if open.len() >= MAX_NESTING {
                     return Some(at);

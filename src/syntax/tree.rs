@@ -204,8 +204,9 @@ fn trivia(rest: &str) -> (Kind, usize) {
         }
         _ => {
             let stop = until(&|c| is_blank(c) || is_eol(c));
-            let comment = rest.find("//").unwrap_or(rest.len());
-            (Kind::Junk, stop.min(comment))
+            // Looked for within the word only: a search to the end would be quadratic.
+            let comment = rest.get(..stop).and_then(|word| word.find("//"));
+            (Kind::Junk, comment.unwrap_or(stop))
         }
     }
 }

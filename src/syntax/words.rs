@@ -52,6 +52,20 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
     "variant",
 ];
 
+/// Whether a line starts a statement, as `statement_start` of the grammar has it.
+pub(super) fn starts_statement(line: &str) -> bool {
+    let line = line.trim_start_matches([' ', '\t']);
+    let end = line.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(line.len());
+    let (word, rest) = line.split_at(end);
+    let next = rest.trim_start_matches([' ', '\t']);
+    next.len() < rest.len()
+        && next.starts_with(|c: char| c.is_ascii_alphanumeric() || "_{\"".contains(c))
+        && (STATEMENT_WORDS.contains(&word) || ITEM_WORDS.contains(&word))
+}
+
+/// How many of [`STATEMENT_WORDS`], which begins with the common ones, help lists.
+pub(super) const COMMON_STATEMENTS: usize = 22;
+
 /// How a statement is written, by the word it starts with.
 pub(super) fn form(word: &str) -> Option<&'static str> {
     Some(match word {
