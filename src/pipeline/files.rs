@@ -9,8 +9,6 @@ pub enum FileError {
     NotFound,
     /// It lies outside the design's folder.
     Outside,
-    /// It is larger than a source may be.
-    TooLarge,
     /// It is not text.
     NotText,
     /// Anything else.
@@ -20,9 +18,8 @@ pub enum FileError {
 impl fmt::Display for FileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NotFound => write!(f, "there is no such file"),
+            Self::NotFound => write!(f, "the file does not exist"),
             Self::Outside => write!(f, "it leads out of the design's folder"),
-            Self::TooLarge => write!(f, "it is too large for a source"),
             Self::NotText => write!(f, "it is not UTF-8 text"),
             Self::Other(why) => write!(f, "{why}"),
         }
