@@ -1,4 +1,5 @@
 //! The command line as scripts see it: exit codes, where output goes, and what is refused.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -51,7 +52,7 @@ fn an_unreadable_source_is_1_and_says_why() {
     std::fs::create_dir(dir.path().join("folder.mech")).unwrap();
     std::fs::write(dir.path().join("bytes.mech"), [0xff, 0xfe, 0x00]).unwrap();
     for (source, reason) in
-        [("none.mech", "no such file"), ("folder.mech", "not a file"), ("bytes.mech", "not UTF-8")]
+        [("none.mech", "does not exist"), ("folder.mech", "not a file"), ("bytes.mech", "not UTF-8")]
     {
         for command in ["check", "build", "simulate", "ir"] {
             let output = flexura(dir.path(), &[command, source]);

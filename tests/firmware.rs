@@ -1,6 +1,7 @@
 //! The sketch on a simulated Arduino Uno: compiled without a warning by avr-gcc, run by simavr for ten
 //! turns, every step pulse counted and timed. Without these tools the test says so and passes, unless
 //! `FLEXURA_EXTERNAL=1` demands them.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use flexura::emit::arduino::Sketch;
 use std::path::{Path, PathBuf};

@@ -51,7 +51,7 @@ pub fn read_text(path: &Path) -> Result<String, FileError> {
     let file = File::open(path).map_err(|e| reason(&e))?;
     file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(|e| reason(&e))?;
     if bytes.len() as u64 > MOST_BYTES {
-        return Err(FileError::TooLarge);
+        return Err(FileError::Other(format!("it is larger than {} MiB", MOST_BYTES >> 20)));
     }
     String::from_utf8(bytes).map_err(|_| FileError::NotText)
 }
@@ -111,6 +111,6 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("large.mech");
         std::fs::write(&path, vec![b' '; MOST_BYTES as usize + 1]).unwrap();
-        assert_eq!(read_text(&path), Err(FileError::TooLarge));
+        assert_eq!(read_text(&path), Err(FileError::Other("it is larger than 4 MiB".into())));
     }
 }

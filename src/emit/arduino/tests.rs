@@ -66,7 +66,7 @@ fn says_why_there_is_no_sketch() {
         SketchError::Position { state: 1 }
     );
     assert_eq!(error(Sketch { angles_rad: vec![0.0, 1.0], ..crank() }), SketchError::NotClosed);
-    assert_eq!(error(Sketch { duration_s: f64::NAN, ..crank() }).to_string().contains("NaN"), true);
+    assert!(error(Sketch { duration_s: f64::NAN, ..crank() }).to_string().contains("NaN"));
     assert!(matches!(error(Sketch { duration_s: 1e9, ..crank() }), SketchError::Duration { .. }));
     let SketchError::TooFast { least_duration_s, .. } = error(Sketch { duration_s: 0.1, ..crank() }) else {
         panic!("100 ms a turn is too fast");
