@@ -22,6 +22,9 @@ pub mod slot;
 pub mod sweep;
 pub mod union;
 
+#[cfg(test)]
+mod tests;
+
 pub use check::{MeshFacts, check_mesh};
 pub use gap::{Fusion, LeastGap, Member, least_gap};
 pub use mesh::Mesh;
