@@ -20,7 +20,7 @@
 use super::grammar::{Failure, Wanted, why};
 use super::lower::Lower;
 use super::tree::{Kind, Node};
-use super::words::{COMMON_STATEMENTS, ITEM_WORDS, STATEMENT_WORDS, form, nearest};
+use super::words::{COMMON_STATEMENTS, ITEM_WORDS, STATEMENT_WORDS, form, is_joint_kind, nearest};
 use crate::diagnostic::{Diagnostic, Origin};
 
 /// Broken parts that are looked into; looking costs as much as parsing them once more.
@@ -34,19 +34,17 @@ pub(super) struct Recovery {
     /// A declaration's head was broken, or something stood outside: what follows outside of any
     /// block is a consequence.
     outside: bool,
+    /// The broken part before lacked its `{`: lines without a keyword are its block's.
+    headless: bool,
     /// Broken parts so far.
     count: usize,
 }
 
 impl Recovery {
-    /// A statement could be read: whatever was open before is over.
+    /// A statement or declaration could be read: whatever was open before is over.
     pub(super) fn reset(&mut self) {
         self.open = 0;
-    }
-
-    /// A declaration could be read.
-    pub(super) fn declared(&mut self) {
-        self.open = 0;
+        self.headless = false;
         self.outside = false;
     }
 }
@@ -59,7 +57,9 @@ impl Lower<'_> {
         }
         let text = self.text(node);
         let word = first_word(text);
-        if !STATEMENT_WORDS.contains(&word) && !looks_like_joint(text) && !self.odd_at(node.start as usize) {
+        // A joint kind is any word; one that is nearly another keyword is that, misspelt.
+        let joint = looks_like_joint(text) && nearest(word, STATEMENT_WORDS).is_none_or(is_joint_kind);
+        if !STATEMENT_WORDS.contains(&word) && !joint && !self.odd_at(node.start as usize) {
             return self.unknown(node, word, STATEMENT_WORDS, "statement");
         }
         self.explain(node, Wanted::Statement, word);
@@ -82,7 +82,7 @@ impl Lower<'_> {
     /// A declaration whose head is broken while its block can be read. True if the block holds
     /// statements worth reading.
     pub(super) fn bad_heading(&mut self, node: &Node) -> bool {
-        self.recovery.declared();
+        self.recovery.reset();
         let heading = node.first(Kind::BadHeading).unwrap_or(node);
         let word = first_word(self.text(heading));
         if ITEM_WORDS.contains(&word) {
@@ -161,11 +161,13 @@ impl Lower<'_> {
         self.recovery.count <= MAX_ERRORS
     }
 
-    /// Whether a broken part only continues parentheses that the one before left open.
+    /// Whether a broken part only continues what the one before left open.
     fn continues(&mut self, node: &Node, keywords: &[&str]) -> bool {
         let text = self.text(node);
         let before = self.recovery.open;
-        let continues = before > 0 && !keywords.contains(&first_word(text));
+        let consequence = before > 0 || self.recovery.headless;
+        let continues = consequence && !keywords.contains(&first_word(text));
+        self.recovery.headless &= continues;
         self.recovery.open = if continues { before } else { 0 };
         node.leaves(&mut |leaf| {
             if leaf.kind == Kind::Junk {
@@ -216,7 +218,7 @@ impl Lower<'_> {
             self.report(Diagnostic::error("E0001", "this could not be read", at));
             return;
         };
-        let at = self.settle(at);
+        let at = self.settle(start, at);
         let (length, found) = found(self.source, at);
         let place = self.at(at, at + length);
         let rest = self.source.get(at..).unwrap_or("");
@@ -235,6 +237,11 @@ impl Lower<'_> {
             let place = if rest.starts_with(is_word) { self.at(word, at + length) } else { place };
             self.report(Diagnostic::error("E0010", message, place).label("not understood").help(help));
             return;
+        }
+        if length == 0 && expected.iter().any(|e| e == "`{`") {
+            // The block's `}` will close the block around, and what follows will stand outside.
+            self.recovery.headless = true;
+            self.recovery.outside = true;
         }
         let expected = list(&expected);
         let mut diagnostic = Diagnostic::error("E0001", format!("expected {expected}, found {found}"), place)
@@ -263,8 +270,11 @@ impl Lower<'_> {
 
     /// Moves a failure back to the end of the line whose continuation was looked for in vain on
     /// the lines after it.
-    fn settle(&self, at: usize) -> usize {
+    fn settle(&self, start: usize, at: usize) -> usize {
         let end = self.after_last_token(at);
+        if end <= start {
+            return at;
+        }
         let crossed = self.source.get(end..at).is_some_and(|t| t.contains(['\n', '\r']));
         if !crossed {
             return at;
