@@ -49,12 +49,10 @@ fn too_deep(text: &str) -> Option<usize> {
                 }
             }
             b'/' if rest.first() == Some(&b'/') => at += to(b"\r\n").unwrap_or(rest.len()),
-            b'\n' | b'\r' => {
-                // No parenthesis reaches over a line that starts a statement.
-                if words::starts_statement(text.get(at + 1..).unwrap_or("")) {
-                    let inner = open.iter().rposition(|b| *b == b'{').map_or(0, |i| i + 1);
-                    open.truncate(inner);
-                }
+            // No parenthesis reaches over a line that starts a statement.
+            b'\n' | b'\r' if words::starts_statement(text.get(at + 1..).unwrap_or("")) => {
+                let inner = open.iter().rposition(|b| *b == b'{').map_or(0, |i| i + 1);
+                open.truncate(inner);
             }
             b'(' | b'{' => {
                 if open.len() >= MAX_NESTING {
@@ -62,11 +60,7 @@ fn too_deep(text: &str) -> Option<usize> {
                 }
                 open.push(byte);
             }
-            b')' => {
-                if open.last() == Some(&b'(') {
-                    open.pop();
-                }
-            }
+            b')' if open.last() == Some(&b'(') => drop(open.pop()),
             b'}' => {
                 // A brace ends whatever parentheses were left open inside it.
                 let outer = open.iter().rposition(|b| *b == b'{');

@@ -81,11 +81,7 @@ impl<'a> Lower<'a> {
                 Kind::Mechanism => file.items.extend(self.mechanism(node, doc)),
                 Kind::Flexure => file.items.extend(self.flexure(node, doc)),
                 Kind::Record => file.items.extend(self.record(node, doc)),
-                Kind::BadHeader => {
-                    if self.bad_heading(node) {
-                        self.statements(node);
-                    }
-                }
+                Kind::BadHeader if self.bad_heading(node) => drop(self.statements(node)),
                 Kind::Stray => self.stray(node),
                 _ => {}
             }

@@ -87,7 +87,6 @@ fn one_deletion_gives_few_diagnostics() {
         for (at, c) in sample.char_indices() {
             let text = format!("{}{}", &sample[..at], &sample[at + c.len_utf8()..]);
             let count = parse(0, &text).diagnostics.len();
-            if count > 3 { eprintln!("{}", &text[at.saturating_sub(20)..at+20].replace("\n","⏎")); }
             assert!(count <= 3, "{count} diagnostics without byte {at} ({c:?})");
         }
     }
