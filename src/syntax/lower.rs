@@ -121,16 +121,16 @@ impl<'a> Lower<'a> {
 
     fn mechanism(&mut self, node: &Node, doc: String) -> Option<Item> {
         let name = self.ident(node)?;
-        let statements = self.statements(node);
-        self.placed(&statements, true);
+        let mut statements = self.statements(node);
+        self.placed(&mut statements, true);
         Some(Item::Mechanism(Mechanism { name, statements, doc, at: self.origin(node) }))
     }
 
     fn flexure(&mut self, node: &Node, doc: String) -> Option<Item> {
         let mut names = self.idents(node).into_iter();
         let (name, replaces) = (names.next()?, names.next()?);
-        let statements = self.statements(node);
-        self.placed(&statements, false);
+        let mut statements = self.statements(node);
+        self.placed(&mut statements, false);
         Some(Item::Flexure(Flexure { name, replaces, statements, doc, at: self.origin(node) }))
     }
 
