@@ -30,7 +30,7 @@ const MAX_NODES: usize = 20_000;
 /// Most expressions evaluated, templates counted at each use; Jansen's leg needs about 5,000.
 const MAX_WORK: usize = 400_000;
 /// Most free variables.
-const MAX_FREE: usize = 4_000;
+const MAX_FREE: usize = 1_000;
 
 /// Where an expression is evaluated.
 #[derive(Clone)]

@@ -152,6 +152,7 @@ impl<'a> Evaluator<'a> {
             let site = Site {
                 joint_name: &text.name.node,
                 joint: i,
+                statement: joint.origin,
                 bodies: &bodies,
                 kind: &text.kind.node,
                 shorter_link_mm,
