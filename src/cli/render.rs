@@ -24,9 +24,9 @@ pub fn report(found: &[Diagnostic], sources: &SourceMap, format: Format) {
     match format {
         Format::Human => show(found, sources),
         Format::Json => {
-            super::commands::print(&format!("{}\n", json!({ "diagnostics": json(found, sources) })))
+            super::commands::print(&format!("{}\n", json!({ "diagnostics": json(found, sources) })));
         }
-    };
+    }
 }
 
 /// Diagnostics as JSON.
