@@ -135,17 +135,14 @@ fn section_angle(k: usize) -> f64 {
     TAU * k as f64 / SECTION_POINTS as f64
 }
 
-/// Weights of the two nearest free edges in the stretch at inner vertex `i` of `n` edges: edge 1 stands for
-/// [0, 1.5 h] of the length, so its strain belongs at 0.75 h; the vertices sit at (i − ½) h.
+/// Weights of the two nearest free edges in the stretch at inner vertex `i` of `n` edges. The strain of an
+/// edge is its tension over EA, and the tension belongs to the edge's own direction, at its middle: between
+/// two free edges the mean, next to a clamp a linear extrapolation.
 fn stretch_weights(i: usize, n: usize) -> [(usize, f64); 2] {
     if i == 1 {
-        [(1, 1.2), (2, -0.2)]
-    } else if i == 2 {
-        [(1, 0.4), (2, 0.6)]
+        [(1, 1.5), (2, -0.5)]
     } else if i == n - 1 {
-        [(n - 2, 1.2), (n - 3, -0.2)]
-    } else if i == n - 2 {
-        [(n - 2, 0.4), (n - 3, 0.6)]
+        [(n - 2, 1.5), (n - 3, -0.5)]
     } else {
         [(i - 1, 0.5), (i, 0.5)]
     }
