@@ -3,6 +3,8 @@
 //!
 //! `cargo test --test rods -- --ignored --nocapture print` prints errors and C for every row.
 
+#![allow(clippy::unwrap_used)]
+
 use flexura::math::Pose;
 use flexura::rod::single::{EndLoad, SingleRod};
 use flexura::rod::{Rod, RodMaterial, RodParameters, RodSystem, Stiffness, ellipse_stiffness};

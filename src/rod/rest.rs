@@ -270,10 +270,8 @@ pub(crate) fn rest_shape<T: Real>(
     {
         return Err(RodError::BadSection);
     }
-    if let Some(s) = stiffness {
-        if ![s.ea, s.ei1, s.ei2, s.gj].into_iter().all(positive) {
-            return Err(RodError::BadSection);
-        }
+    if stiffness.is_some_and(|s| ![s.ea, s.ei1, s.ei2, s.gj].into_iter().all(positive)) {
+        return Err(RodError::BadSection);
     }
     let v = |i: usize| -> V<T> { [q[i], q[i + 1], q[i + 2]] };
     let curve = Hermite { p: [v(0), v(3), v(6), v(9)] };
