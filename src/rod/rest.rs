@@ -38,7 +38,8 @@ pub struct RodParameters {
     pub position_b: Vector3<f64>,
     /// Hermite derivative dP/du at u = 1.
     pub derivative_b: Vector3<f64>,
-    /// Joint axis (any length): m₂ is its projection normal to each rest edge.
+    /// Joint axis (any length): m₂ is its projection normal to each rest edge. For a round wire any
+    /// direction well off its tangents serves: rest curvature and twist follow the frame chosen.
     pub axis: Vector3<f64>,
     /// Semi-axis along m₁ (thin), mm.
     pub a: f64,

@@ -108,7 +108,9 @@ impl Rod {
         Some(EdgeFrame { t, m1, m2: t.cross(&m1), l })
     }
 
-    /// Applies an increment of the internal freedoms (θ₁, x₂, θ₂, …) and the links' new poses.
+    /// Applies an increment of the internal freedoms (θ₁, x₂, θ₂, …) and the links' new poses. The state may
+    /// be one of a rod with the same number of edges and neighbouring parameters: predictions along
+    /// parameters go this way too.
     ///
     /// # Errors
     /// When an edge or its frame would turn by π/2 or more, or a vertex reach a twist of π/2; the state
