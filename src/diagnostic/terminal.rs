@@ -1,7 +1,10 @@
 //! Diagnostics for people: source excerpt, labels and help, drawn by miette (its only client).
 
 use super::{Diagnostic, Label, Origin, Severity, SourceFile, SourceMap};
-use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode, SourceSpan};
+use miette::{
+    GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteError, MietteSpanContents, SourceCode,
+    SourceSpan, SpanContents,
+};
 use std::fmt;
 
 /// How to draw.
@@ -47,7 +50,7 @@ struct Report {
     message: String,
     help: Option<String>,
     labels: Vec<LabeledSpan>,
-    source: Option<NamedSource<String>>,
+    source: Option<Source>,
     related: Vec<Report>,
 }
 
@@ -82,8 +85,35 @@ impl Report {
     }
 }
 
-fn named(file: &SourceFile) -> NamedSource<String> {
-    NamedSource::new(printable(&file.name), shown(&file.text))
+/// A file's name and text as shown. Like miette's own sources, but columns count characters, not bytes.
+struct Source {
+    name: String,
+    text: String,
+}
+
+impl SourceCode for Source {
+    fn read_span<'a>(
+        &'a self,
+        span: &SourceSpan,
+        before: usize,
+        after: usize,
+    ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
+        let read = self.text.read_span(span, before, after)?;
+        let until = self.text.get(..read.span().offset()).unwrap_or("");
+        let column = until.chars().rev().take_while(|c| *c != '\n').count();
+        Ok(Box::new(MietteSpanContents::new_named(
+            self.name.clone(),
+            read.data(),
+            *read.span(),
+            read.line(),
+            column,
+            read.line_count(),
+        )))
+    }
+}
+
+fn named(file: &SourceFile) -> Source {
+    Source { name: printable(&file.name), text: shown(&file.text) }
 }
 
 /// A label as miette wants it, within its file and on character boundaries.

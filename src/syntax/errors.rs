@@ -17,10 +17,13 @@
 //! | E0013 | an expression is too long |
 //! | E0014 | there are more errors than are shown |
 
+use super::found::{
+    article, comment_start, first_word, found, is_word, list, looks_like_joint, odd, starts, unclosed,
+};
 use super::grammar::{Failure, Wanted, why};
 use super::lower::Lower;
 use super::tree::{Kind, Node};
-use super::words::{COMMON_STATEMENTS, ITEM_WORDS, STATEMENT_WORDS, form, nearest};
+use super::words::{ITEM_WORDS, STATEMENT_WORDS, form, is_joint_kind, nearest};
 use crate::diagnostic::{Diagnostic, Origin};
 
 /// Broken parts that are looked into; looking costs as much as parsing them once more.
@@ -34,19 +37,17 @@ pub(super) struct Recovery {
     /// A declaration's head was broken, or something stood outside: what follows outside of any
     /// block is a consequence.
     outside: bool,
+    /// The broken part before lacked its `{`: lines without a keyword are its block's.
+    headless: bool,
     /// Broken parts so far.
     count: usize,
 }
 
 impl Recovery {
-    /// A statement could be read: whatever was open before is over.
+    /// A statement or declaration could be read: whatever was open before is over.
     pub(super) fn reset(&mut self) {
         self.open = 0;
-    }
-
-    /// A declaration could be read.
-    pub(super) fn declared(&mut self) {
-        self.open = 0;
+        self.headless = false;
         self.outside = false;
     }
 }
@@ -59,7 +60,9 @@ impl Lower<'_> {
         }
         let text = self.text(node);
         let word = first_word(text);
-        if !STATEMENT_WORDS.contains(&word) && !looks_like_joint(text) && !self.odd_at(node.start as usize) {
+        // A joint kind is any word; one that is nearly another keyword is that, misspelt.
+        let joint = looks_like_joint(text) && nearest(word, STATEMENT_WORDS).is_none_or(is_joint_kind);
+        if !STATEMENT_WORDS.contains(&word) && !joint && !self.odd_at(node.start as usize) {
             return self.unknown(node, word, STATEMENT_WORDS, "statement");
         }
         self.explain(node, Wanted::Statement, word);
@@ -82,7 +85,7 @@ impl Lower<'_> {
     /// A declaration whose head is broken while its block can be read. True if the block holds
     /// statements worth reading.
     pub(super) fn bad_heading(&mut self, node: &Node) -> bool {
-        self.recovery.declared();
+        self.recovery.reset();
         let heading = node.first(Kind::BadHeading).unwrap_or(node);
         let word = first_word(self.text(heading));
         if ITEM_WORDS.contains(&word) {
@@ -161,11 +164,13 @@ impl Lower<'_> {
         self.recovery.count <= MAX_ERRORS
     }
 
-    /// Whether a broken part only continues parentheses that the one before left open.
+    /// Whether a broken part only continues what the one before left open.
     fn continues(&mut self, node: &Node, keywords: &[&str]) -> bool {
         let text = self.text(node);
         let before = self.recovery.open;
-        let continues = before > 0 && !keywords.contains(&first_word(text));
+        let consequence = before > 0 || self.recovery.headless;
+        let continues = consequence && !keywords.contains(&first_word(text));
+        self.recovery.headless &= continues;
         self.recovery.open = if continues { before } else { 0 };
         node.leaves(&mut |leaf| {
             if leaf.kind == Kind::Junk {
@@ -216,7 +221,7 @@ impl Lower<'_> {
             self.report(Diagnostic::error("E0001", "this could not be read", at));
             return;
         };
-        let at = self.settle(at);
+        let at = self.settle(start, at);
         let (length, found) = found(self.source, at);
         let place = self.at(at, at + length);
         let rest = self.source.get(at..).unwrap_or("");
@@ -235,6 +240,11 @@ impl Lower<'_> {
             let place = if rest.starts_with(is_word) { self.at(word, at + length) } else { place };
             self.report(Diagnostic::error("E0010", message, place).label("not understood").help(help));
             return;
+        }
+        if length == 0 && expected.iter().any(|e| e == "`{`") {
+            // The block's `}` will close the block around, and what follows will stand outside.
+            self.recovery.headless = true;
+            self.recovery.outside = true;
         }
         let expected = list(&expected);
         let mut diagnostic = Diagnostic::error("E0001", format!("expected {expected}, found {found}"), place)
@@ -263,8 +273,11 @@ impl Lower<'_> {
 
     /// Moves a failure back to the end of the line whose continuation was looked for in vain on
     /// the lines after it.
-    fn settle(&self, at: usize) -> usize {
+    fn settle(&self, start: usize, at: usize) -> usize {
         let end = self.after_last_token(at);
+        if end <= start {
+            return at;
+        }
         let crossed = self.source.get(end..at).is_some_and(|t| t.contains(['\n', '\r']));
         if !crossed {
             return at;
@@ -305,118 +318,4 @@ impl Lower<'_> {
     fn odd_at(&self, at: usize) -> bool {
         odd(self.source.get(at..).unwrap_or("")).is_some()
     }
-}
-
-fn is_word(c: char) -> bool {
-    c.is_alphanumeric() || c == '_'
-}
-
-/// Byte offset of the comment on a line, if any.
-fn comment_start(line: &str) -> Option<usize> {
-    let mut quoted = false;
-    let mut last = ' ';
-    for (at, c) in line.char_indices() {
-        if c == '"' {
-            quoted = !quoted;
-        }
-        if c == '/' && last == '/' && !quoted {
-            return Some(at - 1);
-        }
-        last = c;
-    }
-    None
-}
-
-/// The word a text starts with; empty if it starts with something else.
-fn first_word(text: &str) -> &str {
-    let end = text.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(text.len());
-    let word = text.get(..end).unwrap_or("");
-    if word.starts_with(|c: char| c.is_ascii_digit()) { "" } else { word }
-}
-
-/// `KIND NAME:`, whatever the kind.
-fn looks_like_joint(text: &str) -> bool {
-    let rest = text.get(first_word(text).len()..).unwrap_or("").trim_start_matches([' ', '\t']);
-    let name = first_word(rest);
-    let rest = rest.get(name.len()..).unwrap_or("").trim_start_matches([' ', '\t']);
-    !name.is_empty() && rest.starts_with(':')
-}
-
-fn unclosed(text: &str) -> bool {
-    let line = text.lines().next().unwrap_or("");
-    line.matches('"').count() < 2
-}
-
-/// Message and help for a character that the language does not have, with what was meant.
-fn odd(rest: &str) -> Option<(String, String)> {
-    let c = rest.chars().next()?;
-    if c.is_ascii_graphic() && !"`'@#$&|;?\\~!".contains(c) || " \t\n\r".contains(c) {
-        return None;
-    }
-    let meant = match c {
-        '\u{2212}' | '–' | '—' => "write `-` for minus",
-        '×' | '·' | '⋅' => "write `*` for a product",
-        '÷' => "write `/` for a quotient",
-        '≤' => "write `<=`",
-        '≥' => "write `>=`",
-        '²' => "write `^2`",
-        '³' => "write `^3`",
-        '“' | '”' | '„' | '«' | '»' | '\'' | '‘' | '’' => {
-            "texts stand in straight double quotes: `\"…\"`"
-        }
-        '…' => "write `..` for a range",
-        ';' => "one declaration a line: remove it, the line end suffices",
-        '#' => "comments start with `//`",
-        '\u{A0}' | '\u{2007}' | '\u{202F}' => "replace it by an ordinary space",
-        c if c.is_alphabetic() => "names are made of `a`–`z`, `A`–`Z`, `0`–`9` and `_`",
-        c if c.is_control() => "the file may not be text, or not in UTF-8",
-        _ => "remove it; it may stand in comments and texts only",
-    };
-    let (_, shown) = found(rest, 0);
-    Some((format!("{shown} has no meaning here"), meant.into()))
-}
-
-/// Length and description of what stands at a place.
-fn found(source: &str, at: usize) -> (usize, String) {
-    let rest = source.get(at..).unwrap_or("");
-    let Some(c) = rest.chars().next() else { return (0, "the end of the file".into()) };
-    let run = |f: &dyn Fn(char) -> bool| rest.find(|c| !f(c)).unwrap_or(rest.len());
-    let after = rest.trim_start_matches([' ', '\t']);
-    if after.is_empty() || after.starts_with(['\n', '\r']) || after.starts_with("//") {
-        return (0, "the end of the line".into());
-    }
-    if after.len() < rest.len() {
-        return (rest.len() - after.len(), "a space".into());
-    }
-    let length = match c {
-        c if c.is_ascii_digit() => run(&|c| c.is_ascii_alphanumeric() || c == '.'),
-        c if c.is_alphanumeric() || c == '_' => run(&|c| c.is_alphanumeric() || c == '_'),
-        '<' | '>' | '=' => run(&|c| "<>=".contains(c)),
-        _ => c.len_utf8(),
-    };
-    if c.is_control() || c.is_whitespace() || c == '\u{FEFF}' {
-        return (length, format!("the character U+{:04X}", c as u32));
-    }
-    // A long run is named by its beginning.
-    let text: String = rest.get(..length).unwrap_or("").chars().take(40).collect();
-    (length, format!("`{text}`"))
-}
-
-fn list(items: &[String]) -> String {
-    match items {
-        [] => "something else".into(),
-        [only] => only.clone(),
-        [first @ .., last] => format!("{} or {last}", first.join(", ")),
-    }
-}
-
-/// The words a line may start with; of a long list the first, which are the common ones.
-fn starts(what: &str, known: &[&str]) -> String {
-    let more = if known.len() > COMMON_STATEMENTS { ", …" } else { "" };
-    let common: Vec<&str> = known.iter().take(COMMON_STATEMENTS).copied().collect();
-    format!("{what}s start with {}{more}", common.join(", "))
-}
-
-fn article(noun: &str) -> &'static str {
-    if noun.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" }
 }

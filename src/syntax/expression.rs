@@ -47,7 +47,9 @@ impl Lower<'_> {
                 (Expr { kind: ExprKind::Negate(Box::new(inner)), at }, depth + 1)
             }
             Kind::Free => {
-                let mut parts = node.all(Kind::Sum).map(|n| self.measured(n)).collect::<Vec<_>>().into_iter();
+                let operands = node.parts().filter(|n| !matches!(n.kind, Kind::Keyword | Kind::Punctuation));
+                let operands: Vec<_> = operands.map(|n| self.measured(n)).collect();
+                let mut parts = operands.into_iter();
                 match (parts.next(), parts.next(), parts.next()) {
                     (Some((start, a)), Some((lower, b)), Some((upper, c))) => {
                         let kind = ExprKind::Free {

@@ -87,6 +87,7 @@ fn is_weak(rule: Rule) -> bool {
             | Rule::unit_symbol
             | Rule::unit_power
             | Rule::dot
+            | Rule::lparen
     )
 }
 
@@ -143,7 +144,15 @@ fn words(rule: Rule) -> String {
 }
 
 /// The node of a pair; bytes between its inner pairs become leaves.
-fn node(pair: Pair<'_, Rule>, source: &str) -> Node {
+fn node(mut pair: Pair<'_, Rule>, source: &str) -> Node {
+    // `3` is a sum of one product of one …: such levels say nothing and would cost stack.
+    while matches!(pair.as_rule(), Rule::sum | Rule::product | Rule::unary | Rule::power) {
+        let mut inner = pair.clone().into_inner();
+        match (inner.next(), inner.next()) {
+            (Some(only), None) => pair = only,
+            _ => break,
+        }
+    }
     let span = pair.as_span();
     let (start, end) = (span.start(), span.end());
     let kind = kind(pair.as_rule());

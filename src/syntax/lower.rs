@@ -73,7 +73,7 @@ impl<'a> Lower<'a> {
             }
             let doc = doc.take();
             if !matches!(node.kind, Kind::BadHeader | Kind::Stray) {
-                self.recovery.declared();
+                self.recovery.reset();
             }
             match node.kind {
                 Kind::Edition => self.edition(node, &mut file),
@@ -81,11 +81,7 @@ impl<'a> Lower<'a> {
                 Kind::Mechanism => file.items.extend(self.mechanism(node, doc)),
                 Kind::Flexure => file.items.extend(self.flexure(node, doc)),
                 Kind::Record => file.items.extend(self.record(node, doc)),
-                Kind::BadHeader => {
-                    if self.bad_heading(node) {
-                        self.statements(node);
-                    }
-                }
+                Kind::BadHeader if self.bad_heading(node) => drop(self.statements(node)),
                 Kind::Stray => self.stray(node),
                 _ => {}
             }
@@ -125,16 +121,16 @@ impl<'a> Lower<'a> {
 
     fn mechanism(&mut self, node: &Node, doc: String) -> Option<Item> {
         let name = self.ident(node)?;
-        let statements = self.statements(node);
-        self.placed(&statements, true);
+        let mut statements = self.statements(node);
+        self.placed(&mut statements, true);
         Some(Item::Mechanism(Mechanism { name, statements, doc, at: self.origin(node) }))
     }
 
     fn flexure(&mut self, node: &Node, doc: String) -> Option<Item> {
         let mut names = self.idents(node).into_iter();
         let (name, replaces) = (names.next()?, names.next()?);
-        let statements = self.statements(node);
-        self.placed(&statements, false);
+        let mut statements = self.statements(node);
+        self.placed(&mut statements, false);
         Some(Item::Flexure(Flexure { name, replaces, statements, doc, at: self.origin(node) }))
     }
 
@@ -182,17 +178,30 @@ impl<'a> Lower<'a> {
 }
 
 /// Collects the `///` lines before a declaration.
-#[derive(Default)]
 struct Doc {
     lines: Vec<String>,
+    /// Nothing but space has been on this line so far. What stands behind a declaration on its
+    /// line documents nothing.
+    line_start: bool,
+}
+
+impl Default for Doc {
+    fn default() -> Self {
+        Self { lines: Vec::new(), line_start: true }
+    }
 }
 
 impl Doc {
     /// Whether a node was trivia; doc lines are kept.
     fn takes(&mut self, text: &str, kind: Kind) -> bool {
-        if let (Kind::Doc, Some(line)) = (kind, text.strip_prefix("///")) {
+        if let (Kind::Doc, true, Some(line)) = (kind, self.line_start, text.strip_prefix("///")) {
             self.lines.push(line.strip_prefix(' ').unwrap_or(line).trim_end().to_owned());
         }
+        self.line_start = match kind {
+            Kind::Newline => true,
+            Kind::Space | Kind::ByteOrderMark => self.line_start,
+            _ => false,
+        };
         kind.is_trivia()
     }
 

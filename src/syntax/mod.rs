@@ -6,6 +6,7 @@
 pub mod ast;
 mod errors;
 mod expression;
+mod found;
 mod grammar;
 pub mod limits;
 mod lower;

@@ -189,9 +189,9 @@ impl Lower<'_> {
         Some(RodEnd { body, position: values.next()?, along: values.next()? })
     }
 
-    /// Reports statements in a block of the wrong sort: a mechanism has no rods, a flexure
-    /// nothing but parameters and rods.
-    pub(super) fn placed(&mut self, statements: &[Statement], mechanism: bool) {
+    /// Reports statements in a block of the wrong sort and takes them out of its meaning: a
+    /// mechanism has no rods, a flexure nothing but parameters and rods.
+    pub(super) fn placed(&mut self, statements: &mut [Statement], mechanism: bool) {
         for statement in statements {
             let (fits, what) = match &statement.kind {
                 StatementKind::Param { .. } | StatementKind::Let { .. } => (true, ""),
@@ -206,6 +206,7 @@ impl Lower<'_> {
                     "a flexure holds `param`, `let` and `rod` statements"
                 };
                 self.report(Diagnostic::error("E0009", what, statement.at).help(help));
+                statement.kind = StatementKind::Broken;
             }
         }
     }

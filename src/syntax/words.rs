@@ -66,6 +66,11 @@ pub(super) fn starts_statement(line: &str) -> bool {
 /// How many of [`STATEMENT_WORDS`], which begins with the common ones, help lists.
 pub(super) const COMMON_STATEMENTS: usize = 22;
 
+/// Whether a keyword is a kind of joint.
+pub(super) fn is_joint_kind(word: &str) -> bool {
+    matches!(word, "hinge" | "ball" | "universal" | "slider" | "cylindrical" | "fixed")
+}
+
 /// How a statement is written, by the word it starts with.
 pub(super) fn form(word: &str) -> Option<&'static str> {
     Some(match word {
@@ -80,9 +85,7 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "point" => "point NAME = (X, Y)",
         "ground" => "ground NAME { POINT, … }",
         "link" => "link NAME { POINT, … }",
-        "hinge" | "ball" | "universal" | "slider" | "cylindrical" | "fixed" => {
-            "KIND NAME: BODY to BODY at POINT"
-        }
+        word if is_joint_kind(word) => "KIND NAME: BODY to BODY at POINT",
         "material" => "material NAME",
         "print" => "print on PROCESS",
         "links" => "links height LENGTH",

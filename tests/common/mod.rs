@@ -1,5 +1,7 @@
 //! Shared by the integration tests.
-#![allow(dead_code)]
+#![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+pub mod annotated;
 
 use flexura::elaborate::{FileError, Files};
 use flexura::ir::Design;
