@@ -30,7 +30,7 @@ const MAX_NODES: usize = 20_000;
 /// Most expressions evaluated, templates counted at each use; Jansen's leg needs about 5,000.
 const MAX_WORK: usize = 400_000;
 /// Most free variables.
-const MAX_FREE: usize = 4_000;
+const MAX_FREE: usize = 1_000;
 
 /// Where an expression is evaluated.
 #[derive(Clone)]
@@ -630,18 +630,26 @@ impl<'a> Evaluator<'a> {
         let [start_value, lower_value, upper_value] = bounds;
         if !(lower_value < upper_value) {
             return self.fail(
-                Diagnostic::error(codes::FREE_BOUNDS, format!("the lower bound of `{path}` is not below the upper one"), at)
-                    .also(lower.at, self.show(lower_value, dim))
-                    .also(upper.at, self.show(upper_value, dim)),
+                Diagnostic::error(
+                    codes::FREE_BOUNDS,
+                    format!("the lower bound of `{path}` is not below the upper one"),
+                    at,
+                )
+                .also(lower.at, self.show(lower_value, dim))
+                .also(upper.at, self.show(upper_value, dim)),
             );
         }
         if !(lower_value..=upper_value).contains(&start_value) {
             return self.fail(
-                Diagnostic::error(codes::FREE_BOUNDS, format!("the bounds of `{path}` do not contain its start"), at)
-                    .also(start.at, format!("starts at {}", self.show(start_value, dim)))
-                    .also(lower.at, self.show(lower_value, dim))
-                    .also(upper.at, self.show(upper_value, dim))
-                    .help("move the start between the bounds, or widen them"),
+                Diagnostic::error(
+                    codes::FREE_BOUNDS,
+                    format!("the bounds of `{path}` do not contain its start"),
+                    at,
+                )
+                .also(start.at, format!("starts at {}", self.show(start_value, dim)))
+                .also(lower.at, self.show(lower_value, dim))
+                .also(upper.at, self.show(upper_value, dim))
+                .help("move the start between the bounds, or widen them"),
             );
         }
         if self.free.len() >= MAX_FREE {

@@ -324,6 +324,10 @@ impl<'a> Evaluator<'a> {
         match &e.kind {
             ExprKind::Name(path) if path.len() == 1 => path.first().ok_or(Failed),
             ExprKind::Broken => Err(Failed),
+            ExprKind::Name(path) => {
+                let name: Vec<&str> = path.iter().map(|p| p.node.as_str()).collect();
+                self.later(codes::LATER_TERM, &name.join("."), e.at)
+            }
             _ => self.fail(Diagnostic::error(codes::TYPE, format!("the name of a {what} is needed"), e.at)),
         }
     }
@@ -471,7 +475,7 @@ impl<'a> Evaluator<'a> {
         scope: usize,
         e: &'a Expr,
         drives: &BTreeMap<String, usize>,
-        motors: &[Drive],
+        texts: &[DriveText<'a>],
     ) -> Outcome<Export> {
         let (name, args): (&'a Ident, &'a [Argument]) = match &e.kind {
             ExprKind::Name(path) if path.len() == 1 => (path.first().ok_or(Failed)?, &[]),
@@ -493,7 +497,7 @@ impl<'a> Evaluator<'a> {
                 let slots = self.arguments(name, args, &["drive"], 1)?;
                 let drive = self.plain_name(slots.first().copied().flatten(), "drive")?;
                 let index = self.drive_named(scope, drive, drives)?;
-                if motors.get(index).is_some_and(|d| d.motor.is_none()) {
+                if texts.iter().any(|d| d.joint.node == drive.node && d.motor.is_none()) {
                     return self.fail(
                         Diagnostic::error(
                             codes::EXPORT,

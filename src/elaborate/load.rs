@@ -83,8 +83,15 @@ impl Program {
 
 /// Reads `root` and its imports.
 pub fn load(root: &str, files: &dyn Files, sources: &mut SourceMap, out: &mut Vec<Diagnostic>) -> Program {
-    let mut loader =
-        Loader { files, sources, out, program: Program::default(), done: BTreeMap::new(), total_bytes: 0, chain: Vec::new() };
+    let mut loader = Loader {
+        files,
+        sources,
+        out,
+        program: Program::default(),
+        done: BTreeMap::new(),
+        total_bytes: 0,
+        chain: Vec::new(),
+    };
     loader.program.root = loader.module(Key::File(root.to_string()), None, Origin::default());
     loader.program
 }
@@ -308,7 +315,15 @@ impl Loader<'_> {
                 v.item.0 = index;
             }
         }
-        self.program.modules.push(Module { file_id, path: key.shown(), file, broken, names, imported, lacks_file });
+        self.program.modules.push(Module {
+            file_id,
+            path: key.shown(),
+            file,
+            broken,
+            names,
+            imported,
+            lacks_file,
+        });
         index
     }
 

@@ -88,7 +88,7 @@ impl<'a> Evaluator<'a> {
         }
         let mut exports = Vec::new();
         for e in &sheet.exports {
-            exports.extend(self.export(scope, e, &driven, drives.as_deref().unwrap_or_default()));
+            exports.extend(self.export(scope, e, &driven, &sheet.drives));
         }
         let geometry = geometry_of(&s, &traces);
         self.check_fixed_geometry(&geometry);
@@ -152,6 +152,7 @@ impl<'a> Evaluator<'a> {
             let site = Site {
                 joint_name: &text.name.node,
                 joint: i,
+                statement: joint.origin,
                 bodies: &bodies,
                 kind: &text.kind.node,
                 shorter_link_mm,

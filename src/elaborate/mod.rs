@@ -196,7 +196,9 @@ impl eval::Evaluator<'_> {
     /// Reports `--set` of names that nothing looked for.
     fn unused_settings(&mut self) {
         for (i, s) in self.settings.0.iter().enumerate() {
-            if self.set_used.contains(&i) {
+            // A second entry of the same name has been reported as such.
+            let again = self.settings.0.iter().take(i).any(|earlier| earlier.path == s.path);
+            if self.set_used.contains(&i) || again {
                 continue;
             }
             let d = Diagnostic::error(

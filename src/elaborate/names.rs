@@ -2,7 +2,8 @@
 
 /// The candidate closest to `name`, if it is close enough to be meant.
 pub fn suggestion<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
-    let allowed = (name.chars().count() / 3).max(1);
+    // One edit in up to four letters, two in five, three in eight.
+    let allowed = (name.chars().count().saturating_add(1) / 3).max(1);
     candidates
         .into_iter()
         .filter(|c| !c.is_empty() && *c != name)
@@ -11,7 +12,7 @@ pub fn suggestion<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>)
             let same_letters = c.eq_ignore_ascii_case(name);
             (if same_letters { 0 } else { strsim::damerau_levenshtein(name, c) }, c)
         })
-        .filter(|(d, c)| *d <= allowed && *d < c.chars().count().max(1))
+        .filter(|(d, c)| *d <= allowed && (*d < c.chars().count() || name.starts_with(c)))
         .min()
         .map(|(_, c)| c.to_string())
 }
@@ -28,5 +29,6 @@ mod tests {
         assert_eq!(suggestion("Size", names), Some("size".into()));
         assert_eq!(suggestion("colour", names), None);
         assert_eq!(suggestion("q", names), None);
+        assert_eq!(suggestion("rr", names), Some("r".into()));
     }
 }

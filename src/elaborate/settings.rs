@@ -2,7 +2,7 @@
 
 use super::codes;
 use crate::diagnostic::{Diagnostic, Origin, SourceMap};
-use crate::syntax::ast::{Expr, Item, StatementKind};
+use crate::syntax::ast::{Expr, ExprKind, Item, StatementKind};
 
 /// One `--set`.
 pub struct Setting {
@@ -26,11 +26,9 @@ impl Settings {
     pub fn parse(set: &[(String, String)], sources: &mut SourceMap, out: &mut Vec<Diagnostic>) -> Self {
         let mut all: Vec<Setting> = Vec::new();
         for (path, text) in set {
-            let wrapped = format!("{BEFORE}{text}\n}}\n");
-            let file = sources.add(format!("--set {path}"), wrapped.clone());
-            let start = BEFORE.len() as u32;
-            let at = Origin { file, start, end: start + text.len() as u32 };
-            let value = match expression(file, &wrapped, text) {
+            let file = sources.add(format!("--set {path}"), text.clone());
+            let at = Origin { file, start: 0, end: text.len() as u32 };
+            let value = match expression(file, text) {
                 Some(e) => Some(e),
                 None => {
                     out.push(
@@ -60,18 +58,58 @@ impl Settings {
 }
 
 /// The one expression of the wrapped text, if it is nothing else.
-fn expression(file: u32, wrapped: &str, text: &str) -> Option<Expr> {
+fn expression(file: u32, text: &str) -> Option<Expr> {
     if text.trim().is_empty() || text.contains(['\n', '\r']) || text.len() > 4096 {
         return None;
     }
-    let parsed = crate::syntax::parse(file, wrapped);
+    let parsed = crate::syntax::parse(file, &format!("{BEFORE}{text}\n}}\n"));
     if parsed.diagnostics.iter().any(Diagnostic::is_error) {
         return None;
     }
     let [Item::Mechanism(m)] = parsed.file.items.as_slice() else { return None };
     let [statement] = m.statements.as_slice() else { return None };
     match &statement.kind {
-        StatementKind::Let { value, .. } => Some(value.clone()),
+        StatementKind::Let { value, .. } => {
+            let mut value = value.clone();
+            shift(&mut value);
+            Some(value)
+        }
         _ => None,
     }
+}
+
+/// Makes the places in an expression count from the value's own start.
+fn shift(e: &mut Expr) {
+    shift_at(&mut e.at);
+    match &mut e.kind {
+        ExprKind::Number { unit, .. } => unit.iter_mut().for_each(|u| shift_at(&mut u.symbol.at)),
+        ExprKind::Name(path) => path.iter_mut().for_each(|p| shift_at(&mut p.at)),
+        ExprKind::Tuple(items) => items.iter_mut().for_each(shift),
+        ExprKind::Negate(inner) => shift(inner),
+        ExprKind::Binary(_, l, r) => {
+            shift(l);
+            shift(r);
+        }
+        ExprKind::Call { function, arguments } => {
+            shift_at(&mut function.at);
+            for a in arguments {
+                if let Some(n) = &mut a.name {
+                    shift_at(&mut n.at);
+                }
+                shift(&mut a.value);
+            }
+        }
+        ExprKind::Free { start, lower, upper } => {
+            shift(start);
+            shift(lower);
+            shift(upper);
+        }
+        ExprKind::Text(_) | ExprKind::Broken => {}
+    }
+}
+
+fn shift_at(at: &mut Origin) {
+    let by = BEFORE.len() as u32;
+    at.start = at.start.saturating_sub(by);
+    at.end = at.end.saturating_sub(by);
 }

@@ -20,6 +20,8 @@ pub struct Site<'s> {
     pub joint_name: &'s str,
     pub joint: JointId,
     pub bodies: &'s [BodyId],
+    /// The joint statement.
+    pub statement: Origin,
     /// Kind written in the text.
     pub kind: &'s str,
     pub shorter_link_mm: f64,
@@ -28,8 +30,32 @@ pub struct Site<'s> {
 }
 
 impl<'a> Evaluator<'a> {
-    /// Elaborates one use of a template; returns its rods.
+    /// Elaborates one use of a template; returns its rods. What goes wrong inside the template also
+    /// points at this use.
     pub(super) fn template(
+        &mut self,
+        scope: usize,
+        module: usize,
+        text: &'a TemplateUse,
+        site: &Site<'_>,
+        rods: &mut Vec<Rod>,
+    ) -> Outcome<Vec<usize>> {
+        let before = self.out.len();
+        let made = self.instance(scope, module, text, site, rods);
+        let (here, s) = (text.name.at, site.statement);
+        let near = |at: Origin| at.file == s.file && s.start <= at.start && at.end <= s.end;
+        for d in self.out.iter_mut().skip(before) {
+            if d.labels.first().is_some_and(|l| !near(l.at)) {
+                d.labels.push(crate::diagnostic::Label {
+                    at: here,
+                    text: format!("in this use, joint `{}`", site.joint_name),
+                });
+            }
+        }
+        made
+    }
+
+    fn instance(
         &mut self,
         scope: usize,
         module: usize,
