@@ -177,7 +177,7 @@ fn a_body_in_the_cranks_way_is_found_at_the_right_state() {
     let skipped = [(BASE, COUPLER), (BASE, ROCKER), (COUPLER, ROCKER)];
     let gaps: Vec<f64> = least_gap(&plans, &states, &skipped).iter().map(|g| g.unwrap().gap_mm).collect();
     let worst = gaps.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1)).unwrap();
-    assert!(*worst.1 < -1.0 && worst.0.abs_diff(40) <= 1, "{worst:?}");
+    assert!(*worst.1 < -1.0 && worst.0.abs_diff(40) <= 4, "{worst:?}");
     assert!(gaps[10] >= CLEARANCE, "{}", gaps[10]);
 }
 

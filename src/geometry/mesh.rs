@@ -82,6 +82,50 @@ impl Mesh {
         out
     }
 
+    /// The same mesh in the one order its coordinates give: vertices sorted, every triangle from its
+    /// least corner on, triangles sorted.
+    pub(crate) fn sorted(&self) -> Mesh {
+        let mut order: Vec<usize> = (0..self.vertices.len()).collect();
+        let key = |i: usize| &self.vertices[i];
+        order.sort_by(|i, j| {
+            let (p, q) = (key(*i), key(*j));
+            p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(p.z.total_cmp(&q.z)).then(i.cmp(j))
+        });
+        let mut place = vec![0; order.len()];
+        for (new, old) in order.iter().enumerate() {
+            place[*old] = new;
+        }
+        let mut triangles: Vec<[usize; 3]> = self
+            .triangles
+            .iter()
+            .map(|t| {
+                let mut t = t.map(|i| place[i]);
+                let least = (0..3).min_by_key(|k| t[*k]).unwrap_or(0);
+                t.rotate_left(least);
+                t
+            })
+            .collect();
+        triangles.sort_unstable();
+        Mesh { vertices: order.iter().map(|i| self.vertices[*i]).collect(), triangles }
+    }
+
+    /// Moves every vertex by up to `size_mm` a coordinate, by a fixed function of `seed` and its
+    /// index, so that no two operands of a boolean operation are in special position.
+    pub(crate) fn shaken(mut self, size_mm: f64, seed: u64) -> Mesh {
+        // SplitMix64 (Steele, Lea and Flood 2014).
+        let mut state = seed.wrapping_mul(0xD1B5_4A32_D192_ED03);
+        let mut next = || {
+            state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+            let z = (state ^ (state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+            let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+            ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        for p in &mut self.vertices {
+            *p += Vector3::new(next(), next(), next()) * size_mm;
+        }
+        self
+    }
+
     /// Removes pairs of triangles on the same three vertices with opposite orientation.
     pub(crate) fn drop_folded_pairs(&mut self) {
         let mut seen: BTreeMap<[usize; 3], Vec<(usize, bool)>> = BTreeMap::new();

@@ -32,24 +32,37 @@ impl fmt::Display for BooleanError {
 
 impl std::error::Error for BooleanError {}
 
+/// Operands are shaken by this much before they are united, mm: symmetric solids give ties, and the
+/// kernel breaks ties in the order of a hash table, differently in every run. Ten times the
+/// rounding to `f32` would still be invisible; a thousandth of it would still break ties.
+const SHAKE_MM: f64 = 4e-6;
+
 /// Union of all meshes, pairwise as a balanced tree: the same tree on any number of threads.
+///
+/// # Errors
+/// No mesh, an operand that is not closed, or a failure of the kernel.
 pub fn union_all(meshes: &[Mesh]) -> Result<Mesh, BooleanError> {
-    Ok(from_kernel(&union_tree(meshes)?))
+    let shaken: Vec<Mesh> =
+        meshes.iter().enumerate().map(|(i, m)| m.clone().shaken(SHAKE_MM, i as u64)).collect();
+    union_tree(&shaken)
 }
 
 /// `solid` without `tools`, one after the other.
+///
+/// # Errors
+/// An operand that is not closed, or a failure of the kernel.
 pub fn subtract_all(solid: &Mesh, tools: &[Mesh]) -> Result<Mesh, BooleanError> {
-    let mut left = to_kernel(solid)?;
-    for tool in tools {
-        left = boolean(&left, &to_kernel(tool)?, OpType::Subtract)?;
+    let mut left = solid.clone();
+    for (i, tool) in tools.iter().enumerate() {
+        left = boolean(&left, &tool.clone().shaken(SHAKE_MM, 1000 + i as u64), OpType::Subtract)?;
     }
-    Ok(from_kernel(&left))
+    Ok(left)
 }
 
-fn union_tree(meshes: &[Mesh]) -> Result<Manifold, BooleanError> {
+fn union_tree(meshes: &[Mesh]) -> Result<Mesh, BooleanError> {
     match meshes {
         [] => Err(BooleanError::Empty),
-        [one] => to_kernel(one),
+        [one] => Ok(one.clone()),
         _ => {
             let (left, right) = meshes.split_at(meshes.len() / 2);
             let (a, b) = rayon::join(|| union_tree(left), || union_tree(right));
@@ -58,10 +71,13 @@ fn union_tree(meshes: &[Mesh]) -> Result<Manifold, BooleanError> {
     }
 }
 
-fn boolean(a: &Manifold, b: &Manifold, op: OpType) -> Result<Manifold, BooleanError> {
-    catch_unwind(AssertUnwindSafe(|| compute_boolean(a, b, op)))
+/// One operation; the result in sorted order, which forgets the kernel's own.
+fn boolean(a: &Mesh, b: &Mesh, op: OpType) -> Result<Mesh, BooleanError> {
+    let (a, b) = (to_kernel(a)?, to_kernel(b)?);
+    let result = catch_unwind(AssertUnwindSafe(|| compute_boolean(&a, &b, op)))
         .map_err(|_| BooleanError::Panic)?
-        .map_err(BooleanError::Kernel)
+        .map_err(BooleanError::Kernel)?;
+    Ok(from_kernel(&result).sorted())
 }
 
 fn to_kernel(mesh: &Mesh) -> Result<Manifold, BooleanError> {
