@@ -2,9 +2,9 @@
 //! forward form: one back-substitution per parameter with the factors of the accepted state.
 
 use super::model::Model;
-use super::newton::{Equilibrium, SolveError, Solver, gather};
-use crate::rod::StrainDerivatives;
-use nalgebra::{DMatrix, DVector, SMatrix};
+use super::newton::{Equilibrium, SolveError, Solver};
+use crate::rod::{PARAMETERS, StrainJacobian};
+use nalgebra::{DMatrix, DVector};
 
 /// First derivatives of one equilibrium by the n design parameters.
 #[derive(Clone, Debug)]
@@ -13,10 +13,10 @@ pub struct Sensitivity {
     pub links: DMatrix<f64>,
     /// Multipliers, rows × n.
     pub lambda: DMatrix<f64>,
-    /// Internal increments of each rod (twists and vertices interleaved), internal × n.
-    pub internal: Vec<DMatrix<f64>>,
-    /// Strain measures of each rod with their total derivatives.
-    pub strains: Vec<StrainDerivatives>,
+    /// Per rod its own 29 directions (12 link increments, 17 parameters) by the n, 29 × n.
+    pub directions: Vec<DMatrix<f64>>,
+    /// Per rod its strain measures with their derivatives by those 29 directions.
+    pub strains: Vec<StrainJacobian>,
 }
 
 /// Reused by one thread.
@@ -62,27 +62,23 @@ impl SensitivityWorkspace {
             solver.solve_scaled(&mut v);
             column.copy_from(&v);
         }
-        let mut internal = Vec::with_capacity(model.rods.len());
+        let mut directions = Vec::with_capacity(model.rods.len());
         let mut strains = Vec::with_capacity(model.rods.len());
-        for (rod, system) in model.rods.iter().zip(&mut solver.systems) {
-            let mut d_link = DMatrix::zeros(12, parameters);
-            for c in 0..parameters {
-                let v: SMatrix<f64, 12, 1> = gather(model, rod.bodies, &rhs.column(c).clone_owned());
-                d_link.set_column(c, &v);
+        for (rod, system) in model.rods.iter().zip(&solver.systems) {
+            let mut own = DMatrix::zeros(12 + PARAMETERS, parameters);
+            for (half, body) in rod.bodies.into_iter().enumerate() {
+                if let Some(first) = model.layout.bodies[body].first_dof {
+                    own.rows_mut(6 * half, 6).copy_from(&rhs.rows(first, 6));
+                }
             }
-            let d_internal = system
-                .internal_sensitivity(&d_link, &rod.dq_dp)
-                .map_err(|_| SolveError::NoDerivatives)?;
-            let d_strains = system
-                .strain_derivatives(&rod.rod, &d_internal, &d_link, &rod.dq_dp)
-                .map_err(|_| SolveError::NoDerivatives)?;
-            internal.push(d_internal);
-            strains.push(d_strains);
+            own.rows_mut(12, PARAMETERS).copy_from(&rod.dq_dp);
+            directions.push(own);
+            strains.push(system.strain_jacobian(&rod.rod).map_err(|_| SolveError::NoDerivatives)?);
         }
         Ok(Sensitivity {
             links: rhs.rows(0, n).into_owned(),
             lambda: rhs.rows(n, m).into_owned(),
-            internal,
+            directions,
             strains,
         })
     }

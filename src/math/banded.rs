@@ -53,8 +53,12 @@ impl BandedLdl {
     /// Factors the matrix whose columns are `matrix` (entries beyond the last row are ignored) with
     /// `shift(j)` added to the diagonal. Returns the number of pivots that are not positive.
     pub fn factor(&mut self, matrix: &[BandColumn], shift: impl Fn(usize) -> f64) -> usize {
-        let n = self.n.min(matrix.len());
-        for (j, (to, from)) in self.columns.iter_mut().zip(&matrix[..n]).enumerate() {
+        let n = self.n;
+        let Some(matrix) = matrix.get(..n) else {
+            self.negative = n;
+            return n;
+        };
+        for (j, (to, from)) in self.columns.iter_mut().zip(matrix).enumerate() {
             *to = *from;
             to[0] += shift(j);
             to[HALF_BANDWIDTH + 1] = 0.0;
@@ -67,9 +71,9 @@ impl BandedLdl {
         }
         self.negative = 0;
         self.smallest_ratio = f64::INFINITY;
-        for j in 0..n {
+        for (j, original) in matrix.iter().enumerate() {
             let column = self.columns[j];
-            let own = (matrix[j][0] + shift(j)).abs().max(f64::MIN_POSITIVE);
+            let own = (original[0] + shift(j)).abs().max(f64::MIN_POSITIVE);
             let mut pivot = column[0];
             self.smallest_ratio = self.smallest_ratio.min(pivot.abs() / own);
             if pivot.is_nan() || pivot <= 0.0 {

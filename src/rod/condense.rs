@@ -37,12 +37,12 @@ impl RodSystem {
             return report;
         }
         let internal = FIRST_INTERNAL..4 * self.n - 4;
-        let diagonal = internal.clone().filter(|i| i % 4 != 3).map(|i| self.band[i][0].abs());
+        let diagonal = internal.clone().filter(|i| !(i + 1).is_multiple_of(4)).map(|i| self.band[i][0].abs());
         let mut shift = FIRST_SHIFT * diagonal.fold(0.0, f64::max);
         let twist = self.twist_scale * self.twist_scale;
         for _ in 0..MAX_SHIFTS {
             let matrix = &self.band[internal.clone()];
-            let scaled = |i: usize| if i % 4 == 0 { shift * twist } else { shift };
+            let scaled = |i: usize| if i.is_multiple_of(4) { shift * twist } else { shift };
             if self.factors.factor(matrix, scaled) == 0 {
                 self.factored = Some(shift);
                 report.shift = shift;

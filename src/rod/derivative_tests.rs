@@ -169,14 +169,14 @@ fn condensation_matches_dense() {
     assert_eq!(report.negative_pivots, eigen.iter().filter(|&&e| e < 0.0).count());
     let inverse = inner.try_inverse().unwrap();
     let c = h.view((0, n), (n, 12)).into_owned();
-    let want_h = h.view((n, n), (12, 12)) - c.transpose() * &inverse * &c;
+    let want_h = h.view((n, n), (12, 12)) - c.tr_mul(&(&inverse * &c));
     let want_g = g.rows(n, 12) - c.transpose() * &inverse * g.rows(0, n);
-    assert!((&ch - &want_h).amax() < 1e-9 * h.amax());
+    assert!((ch - &want_h).amax() < 1e-9 * h.amax());
     assert!((cg - want_g).amax() < 1e-9 * g.amax());
     assert_eq!(ch, ch.transpose());
     let d = SVector::<f64, 12>::from_fn(|i, _| (i as f64).sin());
     let x = system.back_substitute(&d);
-    let want = -(&inverse * (g.rows(0, n) + &c * d));
+    let want = -(inverse * (g.rows(0, n) + &c * d));
     for i in 0..n {
         assert!((x[i] - want[i]).abs() < 1e-8 * want.amax());
     }
@@ -237,29 +237,40 @@ fn energy_is_invariant_under_rigid_motion() {
     assert!((force + inner).norm() < 1e-10 * g.norm());
 }
 
-/// The time of one Newton iteration; run with `--ignored --nocapture` in release mode.
+/// The time of building, one Newton iteration and sensitivities; run with `--ignored --nocapture` optimised.
 #[test]
 #[ignore = "a measurement"]
 fn time_per_edge() {
-    let sample = random_sample(2, 40);
-    let mut system = RodSystem::new(&sample.rod);
-    let rounds = 20_000;
-    let start = std::time::Instant::now();
-    let mut parts = [0.0; 4];
-    for _ in 0..rounds {
-        let t0 = std::time::Instant::now();
-        system.assemble(&sample.rod, &sample.state, &sample.a, &sample.b);
-        let t1 = std::time::Instant::now();
+    let edges = 40;
+    let Sample { rod, state, a, b } = random_sample(2, edges);
+    let mut system = RodSystem::new(&rod);
+    let report = |name: &str, rounds: u32, run: &mut dyn FnMut()| {
+        let start = std::time::Instant::now();
+        (0..rounds).for_each(|_| run());
+        let each = start.elapsed().as_secs_f64() / f64::from(rounds) * 1e6;
+        println!("{name}: {each:.2} µs, {:.3} µs per edge", each / edges as f64);
+    };
+    report("assemble", 20_000, &mut || system.assemble(&rod, &state, &a, &b));
+    report("factor", 20_000, &mut || {
         system.factor_unshifted();
-        let t2 = std::time::Instant::now();
+    });
+    report("condense", 20_000, &mut || {
         std::hint::black_box(system.condense());
-        let t3 = std::time::Instant::now();
+    });
+    report("back substitute", 20_000, &mut || {
         std::hint::black_box(system.back_substitute(&SVector::zeros()));
-        let t4 = std::time::Instant::now();
-        for (p, d) in parts.iter_mut().zip([t1 - t0, t2 - t1, t3 - t2, t4 - t3]) {
-            *p += d.as_secs_f64();
-        }
-    }
-    let per = |s: f64| s / f64::from(rounds) / 40.0 * 1e6;
-    println!("µs per edge: {:.3}, parts {:?}", per(start.elapsed().as_secs_f64()), parts.map(per));
+    });
+    let mut moving = state.clone();
+    let zero = vec![0.0; rod.internal_freedoms()];
+    report("retract", 20_000, &mut || rod.retract(&mut moving, &zero, &a, &b).unwrap());
+    report("parameter columns", 2_000, &mut || {
+        std::hint::black_box(system.parameter_columns(&rod, &a, &b).unwrap());
+    });
+    report("strain Jacobian", 2_000, &mut || {
+        std::hint::black_box(system.strain_jacobian(&rod).unwrap());
+    });
+    let strains = system.strains(&rod);
+    report("stresses", 2_000, &mut || drop(std::hint::black_box(rod.stresses(&strains))));
+    report("Rod::new", 2_000, &mut || drop(Rod::new(&curved(), MATERIAL, edges)));
+    report("Rod::with_derivatives", 500, &mut || drop(Rod::with_derivatives(&curved(), MATERIAL, edges)));
 }

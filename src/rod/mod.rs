@@ -41,7 +41,8 @@
 //!
 //! Per iteration: [`RodSystem::assemble`], [`RodSystem::factor`], [`RodSystem::condense`], solve for the
 //! links, [`RodSystem::back_substitute`], [`Rod::retract`]. At an equilibrium of a rod made by
-//! [`Rod::with_derivatives`]: [`RodSystem::parameter_columns`], [`RodSystem::internal_sensitivity`].
+//! [`Rod::with_derivatives`]: [`RodSystem::parameter_columns`], [`RodSystem::internal_sensitivity`] (or, transposed,
+//! [`RodSystem::internal_pull_back`]), [`RodSystem::strain_jacobian`].
 
 mod assemble;
 mod condense;
@@ -63,7 +64,9 @@ pub use rest::{MIN_EDGES, PARAMETERS, RodError, RodParameters};
 pub use section::{RodMaterial, Stiffness, ellipse_stiffness};
 pub use sensitivity::{ParameterMatrix, SensitivityError};
 pub use state::{RetractError, RodState};
-pub use stress::{SECTION_POINTS, STATION_VALUES, StationStrain, StrainDerivatives, StressSample};
+pub use stress::{
+    RodDirections, SECTION_POINTS, STATION_VALUES, StationStrain, StrainJacobian, StressSample,
+};
 
 use crate::math::dual::Dual;
 use nalgebra::Vector3;

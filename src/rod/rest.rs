@@ -38,7 +38,8 @@ pub struct RodParameters {
     pub position_b: Vector3<f64>,
     /// Hermite derivative dP/du at u = 1.
     pub derivative_b: Vector3<f64>,
-    /// Joint axis (any length): m₂ is its projection normal to each rest edge.
+    /// Joint axis (any length): m₂ is its projection normal to each rest edge. For a round wire any
+    /// direction well off its tangents serves: rest curvature and twist follow the frame chosen.
     pub axis: Vector3<f64>,
     /// Semi-axis along m₁ (thin), mm.
     pub a: f64,
@@ -270,10 +271,8 @@ pub(crate) fn rest_shape<T: Real>(
     {
         return Err(RodError::BadSection);
     }
-    if let Some(s) = stiffness {
-        if ![s.ea, s.ei1, s.ei2, s.gj].into_iter().all(positive) {
-            return Err(RodError::BadSection);
-        }
+    if stiffness.is_some_and(|s| ![s.ea, s.ei1, s.ei2, s.gj].into_iter().all(positive)) {
+        return Err(RodError::BadSection);
     }
     let v = |i: usize| -> V<T> { [q[i], q[i + 1], q[i + 2]] };
     let curve = Hermite { p: [v(0), v(3), v(6), v(9)] };
@@ -358,4 +357,97 @@ fn integrated_measures<T: Real>(f0: &[V<T>; 3], f1: &[V<T>; 3]) -> [T; 3] {
     let sine = dot(&f0[1], &f1[0]) - dot(&f0[0], &f1[1]);
     let cosine = dot(&f0[0], &f1[0]) + dot(&f0[1], &f1[1]);
     [kappa(0), kappa(1), sine.atan2(cosine)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Pose;
+    use crate::rod::derivative_tests::{MATERIAL, curved};
+    use crate::rod::{Rod, RodSystem};
+    use nalgebra::DMatrix;
+
+    /// A semicircle as a Hermite curve is not exact; equal arc length is a property of any curve.
+    #[test]
+    fn vertices_are_at_equal_arc_length() {
+        let q = curved();
+        let edges = 12;
+        let shape = rest_shape::<f64>(&q.to_array(), &MATERIAL, edges, None).unwrap();
+        let curve = Hermite {
+            p: [q.position_a, q.derivative_a, q.position_b, q.derivative_b].map(|v| [v.x, v.y, v.z]),
+        };
+        // Arc length and curve by brute force.
+        let steps = 200_000;
+        let (mut s, mut k) = (0.0, 2);
+        let mut last = curve.point(0.0);
+        let h = shape.length / (edges - 1) as f64;
+        for i in 1..=steps {
+            let p = curve.point(f64::from(i) / f64::from(steps));
+            s += norm(&axpy(&p, -1.0, &last));
+            if k < edges - 1 && s >= (k as f64 - 0.5) * h {
+                assert!(norm(&axpy(&p, -1.0, &shape.vertices[k])) < 1e-3, "vertex {k}");
+                k += 1;
+            }
+            last = p;
+        }
+        assert_eq!(k, edges - 1);
+        assert!((s / shape.length - 1.0).abs() < 1e-9, "{s} {}", shape.length);
+        // The clamp planes halve the end edges.
+        for (j, at) in [(0, q.position_a), (edges - 1, q.position_b)] {
+            let middle = axpy(&shape.vertices[j], 1.0, &shape.vertices[j + 1]).map(|x| 0.5 * x);
+            assert!((Vector3::from(middle) - at).norm() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn bad_rods_are_typed_errors() {
+        let good = curved();
+        let build = |q: &RodParameters, n| Rod::new(q, MATERIAL, n).map(|_| ());
+        assert_eq!(build(&good, 6), Ok(()));
+        assert_eq!(build(&good, 5), Err(RodError::TooFewEdges { edges: 5 }));
+        assert_eq!(build(&RodParameters { a: 0.0, ..good }, 9), Err(RodError::BadSection));
+        assert_eq!(build(&RodParameters { b: f64::NAN, ..good }, 9), Err(RodError::NotFinite));
+        let straight = RodParameters::straight(Vector3::zeros(), Vector3::x() * 9.0, Vector3::x(), 1.0, 1.0);
+        assert_eq!(build(&straight, 9), Err(RodError::AxisParallel { edge: 0 }));
+        let no_axis = RodParameters { axis: Vector3::zeros(), ..good };
+        assert_eq!(build(&no_axis, 9), Err(RodError::AxisParallel { edge: 0 }));
+        let still = RodParameters { derivative_a: Vector3::zeros(), ..good };
+        assert!(matches!(build(&still, 9), Err(RodError::DegenerateCurve { .. })));
+        let point = RodParameters::straight(Vector3::x(), Vector3::x(), Vector3::z(), 1.0, 1.0);
+        assert!(matches!(build(&point, 9), Err(RodError::DegenerateCurve { .. })));
+        let rigid = RodMaterial { e_mpa: f64::INFINITY, nu: 0.3 };
+        assert_eq!(Rod::new(&good, rigid, 9).map(|_| ()), Err(RodError::BadSection));
+        assert_eq!(RodParameters::from_array(&good.to_array()), good);
+    }
+
+    /// The rest shape is stress-free for every parameter: at fixed links the condensed gradient does not
+    /// change, and the inside follows the rest shape.
+    #[test]
+    fn rest_shape_stays_stress_free_along_every_parameter() {
+        let rod = Rod::with_derivatives(&curved(), MATERIAL, 15).unwrap();
+        let state = rod.rest_state();
+        let (a, b) = (Pose::rest(Vector3::zeros()), Pose::rest(Vector3::x() * 20.0));
+        let mut system = RodSystem::new(&rod);
+        system.assemble(&rod, &state, &a, &b);
+        system.factor();
+        system.condense();
+        let columns = *system.parameter_columns(&rod, &a, &b).unwrap();
+        let scale = system.condensed_hessian().amax();
+        assert!(columns.amax() < 1e-9 * scale, "{:e} {scale:e}", columns.amax());
+        let d = system.internal_sensitivity(&DMatrix::zeros(12, 17), &DMatrix::identity(17, 17)).unwrap();
+        let rest = rod.derivatives.as_deref().unwrap();
+        for c in 0..PARAMETERS {
+            for k in 2..=13 {
+                for i in 0..3 {
+                    assert!((d[(4 * k - 7 + i, c)] - rest.vertices[k][i].eps[c]).abs() < 1e-8);
+                }
+            }
+            for j in 1..=13 {
+                let t = (state.vertices[j + 1] - state.vertices[j]).normalize();
+                let m2 = t.cross(&state.m1[j]);
+                let turn: f64 = (0..3).map(|i| m2[i] * rest.m1[j][i].eps[c]).sum();
+                assert!((d[(4 * j - 4, c)] - turn).abs() < 1e-8);
+            }
+        }
+    }
 }

@@ -14,9 +14,9 @@ use crate::math::{Pose, banded::HALF_BANDWIDTH};
 use nalgebra::{DMatrix, SMatrix, SVector, Vector3};
 
 /// Width of the joint solve: 12 link columns, 17 parameters, padding.
-const WIDTH: usize = 32;
+pub(crate) const WIDTH: usize = 32;
 /// First parameter column.
-const FIRST_PARAMETER: usize = 12;
+pub(crate) const FIRST_PARAMETER: usize = 12;
 
 /// 12 by 17: condensed columns.
 pub type ParameterMatrix = SMatrix<f64, 12, PARAMETERS>;
@@ -26,7 +26,7 @@ pub type ParameterMatrix = SMatrix<f64, 12, PARAMETERS>;
 pub(crate) struct ParameterColumns {
     condensed: ParameterMatrix,
     /// K⁻¹ [C, g_int,q], one row per internal freedom.
-    solved: Vec<[f64; WIDTH]>,
+    pub(crate) solved: Vec<[f64; WIDTH]>,
     /// Derivatives by q of the coordinates (x, θ, e) each end carries.
     pub(crate) ends: [SMatrix<f64, 7, PARAMETERS>; 2],
 }
@@ -195,12 +195,12 @@ impl RodSystem {
         let n = self.n;
         let mut out = vec![[0.0; PARAMETERS]; 4 * n + 3];
         let mut local = vec![[[0.0; PARAMETERS]; 4]; n];
-        for j in 1..n - 1 {
+        for (j, local) in local.iter_mut().enumerate().take(n - 1).skip(1) {
             let (l, l0) = (self.frames[j].l, rest.edge_lengths[j]);
             // F = EA (l/l̄ − 1)/w; its work on σ is F l.
             let scale = l / stretch_factor(j, n);
-            add_scaled(&mut local[j][2], scale * (l / l0.re - 1.0), &rest.stiffness[j].ea.eps);
-            add_scaled(&mut local[j][2], -scale * rod.ea[j] * l / (l0.re * l0.re), &l0.eps);
+            add_scaled(&mut local[2], scale * (l / l0.re - 1.0), &rest.stiffness[j].ea.eps);
+            add_scaled(&mut local[2], -scale * rod.ea[j] * l / (l0.re * l0.re), &l0.eps);
         }
         for i in 1..n {
             let measures = &self.measures[i];
@@ -210,9 +210,10 @@ impl RodSystem {
                 let mut dm = [0.0; PARAMETERS];
                 add_scaled(&mut dm, measures.value[f] - rod.rest_measures[i][f], &b.eps);
                 add_scaled(&mut dm, -b.re, &rest.measures[i][f].eps);
-                for c in 0..4 {
-                    add_scaled(&mut local[i - 1][c], measures.before[f][c], &dm);
-                    add_scaled(&mut local[i][c], measures.after[f][c], &dm);
+                for (edge, gradient) in [(i - 1, &measures.before[f]), (i, &measures.after[f])] {
+                    for (row, g) in local[edge].iter_mut().zip(gradient) {
+                        add_scaled(row, *g, &dm);
+                    }
                 }
             }
         }
@@ -221,8 +222,8 @@ impl RodSystem {
             add_scaled(&mut out[4 * j + 3], 1.0, &local[3]);
             for (s, sign) in slot_signs(j, n).into_iter().enumerate() {
                 for r in 0..3 {
-                    for c in 0..3 {
-                        add_scaled(&mut out[4 * (j + s) + r], sign * basis[(r, c)], &local[c]);
+                    for (c, row) in local.iter().enumerate().take(3) {
+                        add_scaled(&mut out[4 * (j + s) + r], sign * basis[(r, c)], row);
                     }
                 }
             }

@@ -108,7 +108,9 @@ impl Rod {
         Some(EdgeFrame { t, m1, m2: t.cross(&m1), l })
     }
 
-    /// Applies an increment of the internal freedoms (θ₁, x₂, θ₂, …) and the links' new poses.
+    /// Applies an increment of the internal freedoms (θ₁, x₂, θ₂, …) and the links' new poses. The state may
+    /// be one of a rod with the same number of edges and neighbouring parameters: predictions along
+    /// parameters go this way too.
     ///
     /// # Errors
     /// When an edge or its frame would turn by π/2 or more, or a vertex reach a twist of π/2; the state
@@ -151,5 +153,55 @@ impl Rod {
         }
         self.write_clamps(state, pose_a, pose_b);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rod::derivative_tests::random_sample;
+
+    #[test]
+    fn steps_too_long_are_refused_and_leave_the_state() {
+        let sample = random_sample(1, 10);
+        let n = sample.rod.internal_freedoms();
+        let mut state = sample.state.clone();
+        let mut twist = vec![0.0; n];
+        twist[8] = 1.7;
+        let refused = sample.rod.retract(&mut state, &twist, &sample.a, &sample.b);
+        assert_eq!(refused, Err(RetractError::EdgeTurn { edge: 3 }));
+        let mut twist = vec![0.0; n];
+        (twist[8], twist[12]) = (1.5, -1.5);
+        let refused = sample.rod.retract(&mut state, &twist, &sample.a, &sample.b);
+        assert!(matches!(refused, Err(RetractError::VertexTwist { .. })), "{refused:?}");
+        let mut fold = vec![0.0; n];
+        fold[1] = 100.0;
+        let refused = sample.rod.retract(&mut state, &fold, &sample.a, &sample.b);
+        assert!(matches!(refused, Err(RetractError::EdgeTurn { .. })), "{refused:?}");
+        let mut lost = vec![0.0; n];
+        lost[2] = f64::NAN;
+        assert!(sample.rod.retract(&mut state, &lost, &sample.a, &sample.b).is_err());
+        assert_eq!(sample.rod.retract(&mut state, &[], &sample.a, &sample.b), Err(RetractError::Length));
+        assert_eq!(state, sample.state);
+        assert_eq!(sample.rod.retract(&mut state, &vec![0.0; n], &sample.a, &sample.b), Ok(()));
+    }
+
+    /// Frames stay orthonormal over many steps, and transport along a closed way of edge directions on a
+    /// sphere turns a frame by the enclosed angle.
+    #[test]
+    fn transport_keeps_frames_and_knows_holonomy() {
+        let mut v = Vector3::y();
+        let way = [Vector3::x(), Vector3::y(), Vector3::z(), Vector3::x()];
+        for w in way.windows(2) {
+            v = parallel_transport(&v, &w[0], &w[1]);
+            assert!(v.dot(&w[1]).abs() < 1e-15 && (v.norm() - 1.0).abs() < 1e-15);
+        }
+        // An octant encloses π/2.
+        assert!((v - Vector3::z()).norm() < 1e-15, "{v}");
+        let sample = random_sample(4, 12);
+        for (j, m) in sample.state.m1.iter().enumerate() {
+            let t = (sample.state.vertices[j + 1] - sample.state.vertices[j]).normalize();
+            assert!(m.dot(&t).abs() < 1e-12 && (m.norm() - 1.0).abs() < 1e-12);
+        }
     }
 }

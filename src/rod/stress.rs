@@ -9,9 +9,9 @@
 //! σ_v² = (Eε_z)² + 3σ_s².
 
 use super::assemble::{FIRST_INTERNAL, RodSystem, end_coordinates, slot_signs};
-use super::sensitivity::SensitivityError;
+use super::sensitivity::{FIRST_PARAMETER, SensitivityError, WIDTH};
 use super::{PARAMETERS, Rod, stretch_factor};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::SVector;
 use std::f64::consts::TAU;
 
 /// Points round a section at which stress is evaluated; a multiple of four, so that both axes are hit.
@@ -89,20 +89,23 @@ impl StationStrain {
         [-2.0 * a2 / (a2 + b2) * y * rate, 2.0 * b2 / (a2 + b2) * x * rate]
     }
 
-    /// Axial, von Mises stress at the section point at angle `phi`, with the derivative of the latter by
-    /// the nine station values (zero where the stress vanishes).
-    fn stress(&self, phi: f64, e: f64, g: f64) -> (f64, f64, [f64; STATION_VALUES]) {
-        let (c, s) = (phi.cos(), phi.sin());
+    /// Axial and von Mises stress at the section point (a cos φ, b sin φ), given (cos φ, sin φ).
+    fn stress(&self, (c, s): (f64, f64), e: f64, g: f64) -> (f64, f64) {
+        let (x, y) = (self.a * c, self.b * s);
+        let axial = e * self.axial_strain(x, y);
+        let [gx, gy] = self.shear_strains(x, y);
+        (axial, (axial * axial + 3.0 * g * g * (gx * gx + gy * gy)).sqrt())
+    }
+
+    /// von Mises stress with its derivative by the nine station values (zero where it vanishes).
+    fn stress_gradient(&self, (c, s): (f64, f64), e: f64, g: f64) -> (f64, [f64; STATION_VALUES]) {
         let (x, y) = (self.a * c, self.b * s);
         let fibre = 1.0 - self.rest_kappa1 * x - self.rest_kappa2 * y;
-        let strain = self.axial_strain(x, y);
-        let axial = e * strain;
-        let [gx, gy] = self.shear_strains(x, y);
-        let shear2 = g * g * (gx * gx + gy * gy);
-        let mises = (axial * axial + 3.0 * shear2).sqrt();
+        let (axial, mises) = self.stress((c, s), e, g);
+        let strain = axial / e;
         let mut d = [0.0; STATION_VALUES];
         if mises == 0.0 {
-            return (axial, mises, d);
+            return (mises, d);
         }
         // ε_z fibre = stretch − (κ − κ̄)·c.
         let w = e * axial / (mises * fibre);
@@ -126,26 +129,24 @@ impl StationStrain {
         let r2 = k * rate * rate;
         d[7] += r2 * (2.0 * a * b2 / (sum * sum) * form * (1.0 - 2.0 * a2 / sum) + base * 2.0 * a * s * s);
         d[8] += r2 * (2.0 * b * a2 / (sum * sum) * form * (1.0 - 2.0 * b2 / sum) + base * 2.0 * b * c * c);
-        (axial, mises, d)
+        (mises, d)
     }
 }
 
-/// Angle of section point `k`.
-fn section_angle(k: usize) -> f64 {
-    TAU * k as f64 / SECTION_POINTS as f64
+/// Cosine and sine of the angle of section point `k`.
+fn section_angle(k: usize) -> (f64, f64) {
+    let (s, c) = (TAU * k as f64 / SECTION_POINTS as f64).sin_cos();
+    (c, s)
 }
 
-/// Weights of the two nearest free edges in the stretch at inner vertex `i` of `n` edges: edge 1 stands for
-/// [0, 1.5 h] of the length, so its strain belongs at 0.75 h; the vertices sit at (i − ½) h.
+/// Weights of the two nearest free edges in the stretch at inner vertex `i` of `n` edges. The strain of an
+/// edge is its tension over EA, and the tension belongs to the edge's own direction, at its middle: between
+/// two free edges the mean, next to a clamp a linear extrapolation.
 fn stretch_weights(i: usize, n: usize) -> [(usize, f64); 2] {
     if i == 1 {
-        [(1, 1.2), (2, -0.2)]
-    } else if i == 2 {
-        [(1, 0.4), (2, 0.6)]
+        [(1, 1.5), (2, -0.5)]
     } else if i == n - 1 {
-        [(n - 2, 1.2), (n - 3, -0.2)]
-    } else if i == n - 2 {
-        [(n - 2, 0.4), (n - 3, 0.6)]
+        [(n - 2, 1.5), (n - 3, -0.5)]
     } else {
         [(i - 1, 0.5), (i, 0.5)]
     }
@@ -172,30 +173,28 @@ impl Rod {
         point: usize,
     ) -> Option<StressSample> {
         let (e, g) = (self.material.e_mpa, self.material.shear_modulus_mpa());
-        let (axial, mises, _) = strains.get(station)?.stress(section_angle(point), e, g);
+        let (axial, mises) = strains.get(station)?.stress(section_angle(point), e, g);
         Some(StressSample { station, point, von_mises_mpa: mises, axial_mpa: axial })
     }
 
     /// von Mises stresses, MPa, at the [`SECTION_POINTS`] points of every station.
     pub fn stresses(&self, strains: &[StationStrain]) -> Vec<[f64; SECTION_POINTS]> {
         let (e, g) = (self.material.e_mpa, self.material.shear_modulus_mpa());
-        strains.iter().map(|s| std::array::from_fn(|k| s.stress(section_angle(k), e, g).1)).collect()
+        let angles: [(f64, f64); SECTION_POINTS] = std::array::from_fn(section_angle);
+        strains.iter().map(|s| angles.map(|angle| s.stress(angle, e, g).1)).collect()
     }
 
     /// The largest von Mises stress; of equals the first.
     pub fn largest_stress(&self, strains: &[StationStrain]) -> Option<StressSample> {
-        let mut best: Option<StressSample> = None;
-        for station in 0..strains.len() {
-            for point in 0..SECTION_POINTS {
-                let sample = self.stress_sample(strains, station, point);
-                if let Some(s) = sample {
-                    if best.is_none_or(|b| s.von_mises_mpa > b.von_mises_mpa) {
-                        best = sample;
-                    }
+        let mut best: Option<(usize, usize, f64)> = None;
+        for (station, row) in self.stresses(strains).iter().enumerate() {
+            for (point, &stress) in row.iter().enumerate() {
+                if best.is_none_or(|b| stress > b.2) {
+                    best = Some((station, point, stress));
                 }
             }
         }
-        best
+        best.and_then(|(station, point, _)| self.stress_sample(strains, station, point))
     }
 }
 
@@ -234,112 +233,141 @@ impl RodSystem {
         values.into_iter().map(StationStrain::from_values).collect()
     }
 
-    /// Total derivatives of the strain measures for n directions: `d_internal` is (4N − 11) by n as from
-    /// [`Self::internal_sensitivity`], `d_link` 12 by n, `dq` 17 by n.
+    /// Derivatives of the strain measures of the last assembled equilibrium by the rod's own 29 directions:
+    /// the 12 link freedoms, then the 17 parameters, the inside of the rod following both.
     ///
     /// # Errors
-    /// Without derivatives or parameter columns, or with matrices of the wrong shape.
-    pub fn strain_derivatives(
-        &self,
-        rod: &Rod,
-        d_internal: &DMatrix<f64>,
-        d_link: &DMatrix<f64>,
-        dq: &DMatrix<f64>,
-    ) -> Result<StrainDerivatives, SensitivityError> {
+    /// Without derivatives, or without parameter columns for this state.
+    pub fn strain_jacobian(&self, rod: &Rod) -> Result<StrainJacobian, SensitivityError> {
         let rest = rod.derivatives.as_deref().ok_or(SensitivityError::NoDerivatives)?;
         let columns = self.columns.as_deref().ok_or(SensitivityError::NoColumns)?;
-        let (n, directions) = (self.n, d_link.ncols());
-        let shaped = |m: &DMatrix<f64>, rows: usize| m.nrows() == rows && m.ncols() == directions;
-        if !shaped(d_internal, self.factors.order()) || !shaped(d_link, 12) || !shaped(dq, PARAMETERS) {
-            return Err(SensitivityError::Shape);
+        let n = self.n;
+        let mut full = vec![[0.0; WIDTH]; 4 * n + 3];
+        for (to, from) in full[FIRST_INTERNAL..].iter_mut().zip(&columns.solved) {
+            *to = from.map(|x| -x);
+        }
+        for end in 0..2 {
+            for (i, at) in end_coordinates(end, n).into_iter().enumerate() {
+                let mut row = [0.0; WIDTH];
+                for c in 0..6 {
+                    row[6 * end + c] = self.jacobians[end][(i, c)];
+                }
+                for c in 0..PARAMETERS {
+                    row[FIRST_PARAMETER + c] = columns.ends[end][(i, c)];
+                }
+                full[at] = row;
+            }
+        }
+        let mut local = vec![[[0.0; WIDTH]; 4]; n];
+        for (j, to) in local.iter_mut().enumerate() {
+            let basis = self.edge_basis(j);
+            for (s, sign) in slot_signs(j, n).into_iter().enumerate() {
+                for r in 0..3 {
+                    for (c, row) in to.iter_mut().enumerate().take(3) {
+                        add_scaled(row, sign * basis[(r, c)], &full[4 * (j + s) + r]);
+                    }
+                }
+            }
+            to[3] = full[4 * j + 3];
+        }
+        // Strains of the free edges: (|e|/|ē| − 1)/w.
+        let mut stretch = vec![[0.0; WIDTH]; n];
+        for (j, to) in stretch.iter_mut().enumerate().take(n - 1).skip(1) {
+            let (l, l0) = (self.frames[j].l, &rest.edge_lengths[j]);
+            let scale = l / (l0.re * stretch_factor(j, n));
+            add_scaled(to, scale, &local[j][2]);
+            add_parameters(to, -scale / l0.re, &l0.eps);
         }
         let strains = self.strains(rod);
-        let mut data = DMatrix::zeros(STATION_VALUES * (n + 1), directions);
-        let mut full = vec![0.0; 4 * n + 3];
-        let mut local = vec![[0.0; 4]; n];
-        let mut values = vec![[0.0; STATION_VALUES]; n + 1];
-        for p in 0..directions {
-            let q = dq.column(p);
-            let along =
-                |eps: &[f64; PARAMETERS]| -> f64 { eps.iter().zip(q.iter()).map(|(a, b)| a * b).sum() };
-            for (to, from) in full[FIRST_INTERNAL..].iter_mut().zip(d_internal.column(p).iter()) {
-                *to = *from;
+        let mut rows = vec![[[0.0; WIDTH]; STATION_VALUES]; n + 1];
+        for (i, to) in rows.iter_mut().enumerate().take(n).skip(1) {
+            let v = &rest.voronoi[i];
+            let (r, now) = (1.0 / v.re, strains[i].values());
+            for (j, w) in stretch_weights(i, n) {
+                add_scaled(&mut to[0], w, &stretch[j]);
             }
-            for end in 0..2 {
-                let carried = self.jacobians[end] * d_link.fixed_view::<6, 1>(6 * end, p)
-                    + columns.ends[end] * dq.fixed_view::<PARAMETERS, 1>(0, p);
-                for (i, at) in end_coordinates(end, n).into_iter().enumerate() {
-                    full[at] = carried[i];
+            let m = &self.measures[i];
+            for f in 0..3 {
+                for (gradient, edge) in [(&m.before[f], i - 1), (&m.after[f], i)] {
+                    for (g, row) in gradient.iter().zip(&local[edge]) {
+                        add_scaled(&mut to[1 + f], g * r, row);
+                    }
                 }
+                add_parameters(&mut to[1 + f], -now[1 + f] * r, &v.eps);
+                add_parameters(&mut to[4 + f], r, &rest.measures[i][f].eps);
+                add_parameters(&mut to[4 + f], -now[4 + f] * r, &v.eps);
             }
-            for (j, to) in local.iter_mut().enumerate() {
-                let signs = slot_signs(j, n);
-                let de = nalgebra::Vector3::from_fn(|c, _| {
-                    signs[0] * full[4 * j + c] + signs[1] * full[4 * j + 4 + c]
-                });
-                let v = self.edge_basis(j).transpose() * de;
-                *to = [v.x, v.y, v.z, full[4 * j + 3]];
-            }
-            let d_strain = |j: usize| {
-                let (l, l0) = (self.frames[j].l, rod.edge_lengths[j]);
-                let relative = local[j][2] - along(&rest.edge_lengths[j].eps) / l0;
-                relative * l / (l0 * stretch_factor(j, n))
-            };
-            for (i, to) in values.iter_mut().enumerate().take(n).skip(1) {
-                let [(j0, w0), (j1, w1)] = stretch_weights(i, n);
-                let v = rest.voronoi[i];
-                let (r, dv) = (1.0 / v.re, along(&v.eps) / v.re);
-                let (m, now) = (&self.measures[i], strains[i].values());
-                to[0] = w0 * d_strain(j0) + w1 * d_strain(j1);
-                for f in 0..3 {
-                    let sum: f64 =
-                        (0..4).map(|c| m.before[f][c] * local[i - 1][c] + m.after[f][c] * local[i][c]).sum();
-                    to[1 + f] = sum * r - now[1 + f] * dv;
-                    to[4 + f] = along(&rest.measures[i][f].eps) * r - now[4 + f] * dv;
-                }
-                for f in 0..2 {
-                    let (s0, s1) = (&rest.sections[i - 1][f], &rest.sections[i][f]);
-                    to[7 + f] = 0.5 * (along(&s0.eps) + along(&s1.eps));
-                }
-            }
-            extrapolate(&mut values);
-            for (k, v) in values.iter().enumerate() {
-                for (c, x) in v.iter().enumerate() {
-                    data[(STATION_VALUES * k + c, p)] = *x;
+            for f in 0..2 {
+                for s in [&rest.sections[i - 1][f], &rest.sections[i][f]] {
+                    add_parameters(&mut to[7 + f], 0.5, &s.eps);
                 }
             }
         }
-        Ok(StrainDerivatives { data, strains })
+        for (to, near, far) in [(0, 1, 2), (n, n - 1, n - 2)] {
+            rows[to] = std::array::from_fn(|c| {
+                std::array::from_fn(|d| 1.5 * rows[near][c][d] - 0.5 * rows[far][c][d])
+            });
+        }
+        Ok(StrainJacobian { rows, strains })
     }
 }
 
-/// Strain measures of a state with their total derivatives.
+fn add_scaled(to: &mut [f64; WIDTH], s: f64, from: &[f64; WIDTH]) {
+    for (t, f) in to.iter_mut().zip(from) {
+        *t += s * f;
+    }
+}
+
+fn add_parameters(to: &mut [f64; WIDTH], s: f64, from: &[f64; PARAMETERS]) {
+    for (t, f) in to[FIRST_PARAMETER..].iter_mut().zip(from) {
+        *t += s * f;
+    }
+}
+
+/// Strain measures of an equilibrium with their derivatives by the rod's 29 own directions, which the
+/// caller chains with dz/dp (12 by n) and dq/dp (17 by n): sums over many samples first, then once.
 #[derive(Clone, Debug)]
-pub struct StrainDerivatives {
-    /// Rows: nine values per station; columns: directions.
-    data: DMatrix<f64>,
+pub struct StrainJacobian {
+    rows: Vec<[[f64; WIDTH]; STATION_VALUES]>,
     strains: Vec<StationStrain>,
 }
 
-impl StrainDerivatives {
+impl StrainJacobian {
     /// The strain measures themselves.
     pub fn strains(&self) -> &[StationStrain] {
         &self.strains
     }
 
-    /// Derivatives of the nine values of [`StationStrain`] at a station (9 by n), if there is such a station.
-    pub fn station(&self, station: usize) -> Option<nalgebra::DMatrixView<'_, f64>> {
-        (station < self.strains.len())
-            .then(|| self.data.rows(STATION_VALUES * station, STATION_VALUES))
-            .map(|rows| rows.into())
+    /// Derivatives of value `value` (in the order of [`StationStrain`]) at a station, if there is such.
+    pub fn row(&self, station: usize, value: usize) -> Option<RodDirections> {
+        self.rows.get(station)?.get(value).map(directions)
     }
 
-    /// von Mises stress (MPa) at a sample and its total derivatives by the n directions.
-    pub fn stress(&self, rod: &Rod, station: usize, point: usize) -> Option<(f64, DVector<f64>)> {
-        let strain = self.strains.get(station)?;
+    /// von Mises stress (MPa) at a sample and its derivatives, if there is such a station.
+    pub fn stress(&self, rod: &Rod, station: usize, point: usize) -> Option<(f64, RodDirections)> {
+        let (strain, rows) = (self.strains.get(station)?, self.rows.get(station)?);
         let (e, g) = (rod.material.e_mpa, rod.material.shear_modulus_mpa());
-        let (_, mises, d) = strain.stress(section_angle(point), e, g);
-        let rows = self.data.rows(STATION_VALUES * station, STATION_VALUES);
-        Some((mises, rows.tr_mul(&DVector::from_column_slice(&d))))
+        let (mises, d) = strain.stress_gradient(section_angle(point), e, g);
+        let mut sum = [0.0; WIDTH];
+        for (d, row) in d.into_iter().zip(rows) {
+            add_scaled(&mut sum, d, row);
+        }
+        Some((mises, directions(&sum)))
     }
+}
+
+fn directions(row: &[f64; WIDTH]) -> RodDirections {
+    RodDirections {
+        link: SVector::from_fn(|i, _| row[i]),
+        parameters: SVector::from_fn(|i, _| row[FIRST_PARAMETER + i]),
+    }
+}
+
+/// Derivatives of a scalar by a rod's link freedoms and parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RodDirections {
+    /// By the 12 link freedoms.
+    pub link: SVector<f64, 12>,
+    /// By the 17 parameters.
+    pub parameters: SVector<f64, PARAMETERS>,
 }

@@ -5,7 +5,7 @@
 use super::{Objective, StateView};
 use crate::equilibrium::Sensitivity;
 use crate::optimize::Normal;
-use crate::rod::SECTION_POINTS;
+use crate::rod::{PARAMETERS, SECTION_POINTS};
 
 /// See the module.
 pub struct StressBelow {
@@ -54,10 +54,22 @@ impl Objective for StressBelow {
     }
 
     fn accumulate(&self, view: &StateView, sensitivity: &Sensitivity, out: &mut Normal) {
+        // Summed in each rod's own directions first, then chained to the design parameters once.
+        let mut own: Vec<Option<Normal>> = vec![None; view.model.rods.len()];
         self.for_each_excess(view, |rod, station, point, weight, excess| {
-            if let Some((_, row)) = sensitivity.strains[rod].stress(&view.model.rods[rod].rod, station, point) {
-                out.add(weight, excess, row.as_slice());
+            let jacobian = &sensitivity.strains[rod];
+            if let Some((_, d)) = jacobian.stress(&view.model.rods[rod].rod, station, point) {
+                let mut row = [0.0; 12 + PARAMETERS];
+                row[..12].copy_from_slice(d.link.as_slice());
+                row[12..].copy_from_slice(d.parameters.as_slice());
+                own[rod].get_or_insert_with(|| Normal::new(row.len())).add(weight, excess, &row);
             }
         });
+        for (normal, chain) in own.iter_mut().zip(&sensitivity.directions) {
+            if let Some(normal) = normal {
+                normal.complete();
+                out.add_chained(normal, chain);
+            }
+        }
     }
 }
