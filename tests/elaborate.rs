@@ -1,5 +1,8 @@
 //! Elaboration: what the texts become, and what is said about texts that are wrong.
 
+// Test code may panic: that is how it fails.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 mod common;
 
 use common::annotated;
@@ -237,6 +240,26 @@ fn tidy(v: &mut serde_json::Value) {
 }
 
 #[test]
+fn every_standard_material_and_process_elaborates() {
+    for module in flexura::elaborate::std_modules() {
+        let name = module.rsplit('.').next().unwrap();
+        let text = match module.split('.').next().unwrap() {
+            "materials" => CHEBYSHEV
+                .replace("use std.materials.rigur", &format!("use std.{module}"))
+                .replace("material rigur", &format!("material {name}"))
+                .replace("rigur.strength / 1.5", &format!("{name}.E / 100")),
+            "processes" => CHEBYSHEV
+                .replace("use std.processes.polyjet", &format!("use std.{module}"))
+                .replace("print on polyjet", &format!("print on {name}")),
+            "motors" => CHEBYSHEV.replace("nema17", name),
+            "flexures" => CHEBYSHEV.replace("crossed_leaves", name),
+            other => panic!("a folder without a test: {other}"),
+        };
+        design(run(&text));
+    }
+}
+
+#[test]
 fn the_target_sample_gives_exactly_what_is_not_available_yet() {
     assert_eq!(
         found(&run(SAMPLE)),
@@ -291,7 +314,7 @@ fn settings_that_are_wrong_are_errors() {
         (("rr", "3 mm"), "E0114 there is nothing to set by the name `rr`"),
         (("half", "3 mm"), "E0114 there is nothing to set by the name `half`"),
         (("knee.wide", "3 mm"), "E0114 there is nothing to set by the name `knee.wide`"),
-        (("r", "20"), "E0202 length: a length (mm) needs a unit"),
+        (("r", "20"), "E0202 a length (mm) is needed, this number has no unit"),
         (("r", ""), "E0115 `` is not a value for `r`"),
         (("r", "3 mm\n    let x = 2"), "E0115 `3 mm\n    let x = 2` is not a value for `r`"),
         (("r", "3 mm } mechanism m {"), "E0115 `3 mm } mechanism m {` is not a value for `r`"),
@@ -376,7 +399,7 @@ fn five_independent_mistakes_give_five_errors() {
         .replace("track(tip", "track(tap");
     let e = run(&text);
     let codes: Vec<_> = e.diagnostics.iter().map(|d| d.code.as_str()).collect();
-    assert_eq!(codes, ["E0202", "E0101", "E0101", "E0101"], "{:?}", found(&e));
+    assert_eq!(codes, ["E0202", "E0101", "E0207", "E0101", "E0101"], "{:?}", found(&e));
 }
 
 #[test]
