@@ -9,7 +9,6 @@ use super::gap::{Fusion, fusions};
 use super::link::{BodyPlan, plan_body};
 use super::mesh::Mesh;
 use super::slot::Facets;
-use super::sweep::SECTION_FACETS;
 use super::union::{BooleanError, subtract_all, union_all};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -223,7 +222,7 @@ fn build_part(input: &PartsInput, plans: &[BodyPlan], bodies: &[usize]) -> Resul
         .collect::<Result<_, BooleanError>>()
         .map_err(failed)?;
     let inside = |f: &&FlexureSolid| bodies.contains(&f.bodies.0);
-    solids.extend(input.flexures.iter().filter(inside).map(|f| f.mesh(SECTION_FACETS)));
+    solids.extend(input.flexures.iter().filter(inside).map(|f| f.mesh(input.facets.around)));
     let mesh = union_all(&solids).map_err(failed)?.rounded_to_f32();
     let notes = bodies.iter().flat_map(|i| plans[*i].notes.iter().cloned()).collect();
     Ok(Part { name, bodies: bodies.to_vec(), mesh, notes })
