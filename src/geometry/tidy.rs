@@ -8,13 +8,16 @@ use nalgebra::Vector3;
 /// Edges shorter than this are collapsed, mm: a hundredth of what a printer resolves.
 pub const SHORT_EDGE_MM: f64 = 0.01;
 
+/// A triangle lower than this is a sliver, mm: its longest edge is flipped.
+const FLAT_MM: f64 = 5e-4;
+
 /// Cosine of the largest turn of a neighbouring triangle.
 const LEAST_COSINE: f64 = 0.97;
 
 /// Passes over all edges; the second finds what the first made possible.
 const PASSES: usize = 3;
 
-/// The mesh without its short edges, as far as they can go.
+/// The mesh without its short edges, as far as they can go, and without slivers.
 pub fn without_short_edges(mesh: &Mesh, limit_mm: f64) -> Mesh {
     let mut work = Work::new(mesh);
     for _ in 0..PASSES {
@@ -22,6 +25,7 @@ pub fn without_short_edges(mesh: &Mesh, limit_mm: f64) -> Mesh {
             break;
         }
     }
+    work.flip_flat_triangles();
     let mut out = Mesh { vertices: work.vertices, triangles: work.triangles.into_iter().flatten().collect() };
     out.drop_unused_vertices();
     out
@@ -103,16 +107,52 @@ impl Work {
         true
     }
 
+    /// Replaces each sliver and the triangle at its longest edge by the two over the other diagonal.
+    fn flip_flat_triangles(&mut self) {
+        for t in 0..self.triangles.len() {
+            let Some(ids) = self.triangles[t] else { continue };
+            let length = |k: usize| (self.vertices[ids[k]] - self.vertices[ids[(k + 1) % 3]]).norm();
+            let longest = (0..3).max_by(|k, l| length(*k).total_cmp(&length(*l))).unwrap_or(0);
+            let (a, b, p) = (ids[longest], ids[(longest + 1) % 3], ids[(longest + 2) % 3]);
+            if self.normal(ids).norm() >= FLAT_MM * length(longest) {
+                continue;
+            }
+            // The neighbour runs through the edge the other way.
+            let runs = |ids: &[usize; 3]| (0..3).find(|k| ids[*k] == b && ids[(*k + 1) % 3] == a);
+            let neighbour = self.fan(a).find_map(|(u, ids)| runs(&ids).map(|k| (u, ids[(k + 2) % 3])));
+            let Some((u, q)) = neighbour else { continue };
+            let old = self.normal([b, a, q]);
+            let (first, second) = ([a, q, p], [q, b, p]);
+            let keeps = |new: [usize; 3]| {
+                let n = self.normal(new);
+                let low = FLAT_MM * (self.vertices[p] - self.vertices[q]).norm();
+                n.norm() > low && n.dot(&old) > LEAST_COSINE * n.norm() * old.norm()
+            };
+            if p == q || self.neighbours(p).binary_search(&q).is_ok() || !keeps(first) || !keeps(second) {
+                continue;
+            }
+            self.triangles[t] = Some(first);
+            self.triangles[u] = Some(second);
+            self.fans[q].push(t);
+            self.fans[p].push(u);
+            self.fans[b].retain(|k| *k != t);
+            self.fans[a].retain(|k| *k != u);
+        }
+    }
+
+    /// Normal of a triangle, as long as twice its area.
+    fn normal(&self, ids: [usize; 3]) -> Vector3<f64> {
+        let [a, b, c] = ids.map(|k| self.vertices[k]);
+        (b - a).cross(&(c - a))
+    }
+
     /// Cosine of the largest turn of a triangle when `gone` moves onto `kept`.
     fn least_cosine(&self, gone: usize, kept: usize) -> f64 {
-        let normal = |ids: [usize; 3]| {
-            let [a, b, c] = ids.map(|k| self.vertices[k]);
-            (b - a).cross(&(c - a))
-        };
         self.fan(gone)
             .filter(|(_, ids)| !ids.contains(&kept))
             .map(|(_, ids)| {
-                let (old, new) = (normal(ids), normal(ids.map(|k| if k == gone { kept } else { k })));
+                let (old, new) =
+                    (self.normal(ids), self.normal(ids.map(|k| if k == gone { kept } else { k })));
                 old.dot(&new) / (old.norm() * new.norm()).max(f64::MIN_POSITIVE)
             })
             .fold(1.0, f64::min)
