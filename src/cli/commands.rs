@@ -6,7 +6,7 @@ use super::sources::{Folder, read_text};
 use super::style::Style;
 use super::{Build, Common, Format, Simulate, human, render};
 use flexura::diagnostic::{Severity, SourceMap};
-use flexura::emit::csv::write_csv;
+use flexura::emit::csv::{MotionTable, columns, values, write_csv};
 use flexura::pipeline::{self, BuildOutcome, Compiler, FileError, Request, Show, placeless};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -73,30 +73,35 @@ pub fn simulate(arguments: &Simulate) -> u8 {
         return unreadable(common, &why);
     }
     let show = Show { rigid: arguments.rigid, poses: arguments.poses };
-    let (out, simulation) = pipeline::simulate(&opened.request, show, &Compiler::default(), &opened.folder);
-    // The table may go to the standard output: findings never do.
-    match common.format {
-        Format::Human => render::show(&out.diagnostics, &out.sources),
-        Format::Json => {
-            for value in render::json(&out.diagnostics, &out.sources) {
-                eprintln!("{value}");
-            }
-        }
+    let (mut out, simulation) =
+        pipeline::simulate(&opened.request, show, &Compiler::default(), &opened.folder);
+    let to_stdout = arguments.output == Path::new("-");
+    if let (Some(simulation), false) = (&simulation, to_stdout)
+        && let Err(e) = write_atomic(&arguments.output, write_csv(&simulation.motion).as_bytes())
+    {
+        out.diagnostics.push(placeless(Severity::Error, "E0731", e.to_string()));
     }
-    let Some(simulation) = simulation else { return FAILED };
-    let text = write_csv(&simulation.motion);
-    let written = if arguments.output == Path::new("-") {
-        print(&text)
-    } else {
-        match write_atomic(&arguments.output, text.as_bytes()) {
-            Ok(()) => FINE,
-            Err(e) => {
-                eprintln!("error: {e}");
-                FAILED
-            }
+    let table = simulation.as_ref().map(|s| &s.motion).filter(|_| to_stdout);
+    let printed = match common.format {
+        // The table may go to the standard output: findings for people never do.
+        Format::Human => {
+            render::show(&out.diagnostics, &out.sources);
+            table.map_or(FINE, |table| print(&write_csv(table)))
         }
+        Format::Json => print(&format!("{}\n", motion_json(&out, table))),
     };
-    written.max(code(&out))
+    printed.max(code(&out))
+}
+
+/// The motion for scripts: the columns and rows of the CSV, unless they went into a file, and the findings.
+fn motion_json(out: &BuildOutcome, table: Option<&MotionTable>) -> serde_json::Value {
+    let columns = table.map(columns);
+    let rows = table.map(|t| (0..t.states.len()).map(|step| values(t, step)).collect::<Vec<_>>());
+    serde_json::json!({
+        "columns": columns,
+        "rows": rows,
+        "diagnostics": render::json(&out.diagnostics, &out.sources),
+    })
 }
 
 /// `flexura build`.
@@ -114,7 +119,8 @@ pub fn build(arguments: &Build) -> u8 {
     };
     let cancel = stop_on_ctrl_c();
     let progress = Terminal::new(common.format == Format::Human);
-    let mut out = pipeline::build(&opened.request, &Compiler::default(), &opened.folder, &progress, &cancel);
+    let compiler = Compiler { method: arguments.optimizer.into(), iterations: arguments.iterations as usize };
+    let mut out = pipeline::build(&opened.request, &compiler, &opened.folder, &progress, &cancel);
     progress.finish();
     let written = match write(&out, &arguments.out, &lock_path) {
         Ok(written) => written,
@@ -174,7 +180,7 @@ fn code(out: &BuildOutcome) -> u8 {
 }
 
 /// Writes to the standard output; a reader that went away is no reason to panic.
-fn print(text: &str) -> u8 {
+pub fn print(text: &str) -> u8 {
     let mut stdout = std::io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         Ok(()) => FINE,

@@ -35,7 +35,9 @@ enum Command {
     Build(Build),
     /// Write the motion over the cycle as CSV
     ///
-    /// Shows the lock's values if it belongs to the design, else the design's start.
+    /// Shows the lock's values if it belongs to the design, else the design's start. One row a state:
+    /// drive values (deg), traced points (mm), drive torques (N*mm), elastic energy (N*mm) and the largest
+    /// von Mises stress (MPa). With --format json the same table is one object: columns, rows, diagnostics.
     Simulate(Simulate),
     /// Print the elaborated design as JSON
     Ir(Common),
@@ -64,7 +66,7 @@ struct Common {
 enum Format {
     /// For people
     Human,
-    /// For scripts: one JSON object
+    /// For scripts: exactly one JSON object on the standard output
     Json,
 }
 
@@ -81,6 +83,29 @@ struct Build {
     /// Refuse to solve: the lock must belong to the design
     #[arg(long, conflicts_with = "fresh")]
     frozen: bool,
+    /// Iterations of the optimiser at most; the best point found is kept
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    iterations: u32,
+    /// Which optimiser; both keep the bounds
+    #[arg(long, value_enum, default_value_t = Optimizer::Lm)]
+    optimizer: Optimizer,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Optimizer {
+    /// Levenberg-Marquardt: uses that the goals are sums of squares; the faster one
+    Lm,
+    /// L-BFGS: uses gradients only; for comparison with the literature
+    Lbfgs,
+}
+
+impl From<Optimizer> for flexura::optimize::Method {
+    fn from(optimizer: Optimizer) -> Self {
+        match optimizer {
+            Optimizer::Lm => Self::LevenbergMarquardt,
+            Optimizer::Lbfgs => Self::Lbfgs,
+        }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -90,7 +115,10 @@ struct Simulate {
     /// The conventional mechanism's motion
     #[arg(long)]
     rigid: bool,
-    /// Add translation and rotation vector of every moving body from rest
+    /// Add the pose of every moving body: translation t (mm) and rotation vector (rad) from the rest pose
+    ///
+    /// A point of the body that lies at X in the rest pose lies at x = t + R X, with R the rotation by the
+    /// vector's length about its direction. Columns pose.BODY.tx_mm to pose.BODY.rz_rad.
     #[arg(long)]
     poses: bool,
     /// Where to write the table; `-` is the standard output

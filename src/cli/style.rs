@@ -25,6 +25,11 @@ impl Style {
         Self { colour: false }
     }
 
+    /// Whether there is colour.
+    pub fn is_coloured(self) -> bool {
+        self.colour
+    }
+
     /// A heading.
     pub fn bold(self, text: &str) -> String {
         self.paint("1", text)

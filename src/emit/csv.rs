@@ -30,64 +30,70 @@ pub struct MotionState {
     pub energy_n_mm: f64,
     /// Largest von Mises stress over all rods, MPa.
     pub stress_max_mpa: f64,
-    /// Translation of the body's centre (mm) and rotation vector (rad) from rest, a body.
+    /// Translation t (mm) and rotation vector (rad), a body: x = t + R X with X in the rest pose.
     pub poses: Vec<([f64; 3], [f64; 3])>,
 }
 
 /// Writes the table as CSV with a header line. Numbers are shortest round-trip.
 pub fn write_csv(table: &MotionTable) -> String {
-    let mut out = String::from("step");
-    for drive in &table.drives {
-        column(&mut out, &format!("drive.{drive}_deg"));
-    }
-    for trace in &table.traces {
-        for axis in ["x", "y", "z"] {
-            column(&mut out, &format!("trace.{trace}.{axis}_mm"));
-        }
-    }
-    if table.has_forces {
-        for drive in &table.drives {
-            column(&mut out, &format!("torque.{drive}_n_mm"));
-        }
-        out.push_str(",energy_n_mm,stress_max_mpa");
-    }
-    for body in &table.bodies {
-        for part in ["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"] {
-            column(&mut out, &format!("pose.{body}.{part}"));
-        }
+    let mut out = String::new();
+    for (i, name) in columns(table).iter().enumerate() {
+        separate(&mut out, i);
+        text(&mut out, name);
     }
     out.push('\n');
-    for (step, state) in table.states.iter().enumerate() {
-        row(&mut out, step, state, table);
+    for step in 0..table.states.len() {
+        let _ = write!(out, "{step}");
+        for value in values(table, step).into_iter().skip(1) {
+            out.push(',');
+            // Absent values stay empty: CSV has no not-a-number.
+            if let Some(value) = value {
+                let _ = write!(out, "{value:?}");
+            }
+        }
+        out.push('\n');
     }
     out
 }
 
-fn row(out: &mut String, step: usize, state: &MotionState, table: &MotionTable) {
-    let _ = write!(out, "{step}");
-    let at = |values: &[f64], i: usize| values.get(i).copied().unwrap_or(f64::NAN);
-    for i in 0..table.drives.len() {
-        number(out, degrees(at(&state.drives_rad, i)));
-    }
-    for i in 0..table.traces.len() {
-        for value in state.traces_mm.get(i).copied().unwrap_or([f64::NAN; 3]) {
-            number(out, value);
-        }
+/// Names of the columns, with their units. The first is `step`.
+pub fn columns(table: &MotionTable) -> Vec<String> {
+    let mut out = vec!["step".to_string()];
+    out.extend(table.drives.iter().map(|drive| format!("drive.{drive}_deg")));
+    for trace in &table.traces {
+        out.extend(["x", "y", "z"].map(|axis| format!("trace.{trace}.{axis}_mm")));
     }
     if table.has_forces {
-        for i in 0..table.drives.len() {
-            number(out, at(&state.torques_n_mm, i));
-        }
-        number(out, state.energy_n_mm);
-        number(out, state.stress_max_mpa);
+        out.extend(table.drives.iter().map(|drive| format!("torque.{drive}_n_mm")));
+        out.extend(["energy_n_mm", "stress_max_mpa"].map(String::from));
+    }
+    for body in &table.bodies {
+        let parts = ["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"];
+        out.extend(parts.map(|part| format!("pose.{body}.{part}")));
+    }
+    out
+}
+
+/// The row of a state, in the order of [`columns`]; `None` for what is absent or no finite number.
+pub fn values(table: &MotionTable, step: usize) -> Vec<Option<f64>> {
+    let nothing = MotionState::default();
+    let state = table.states.get(step).unwrap_or(&nothing);
+    let mut row = vec![step as f64];
+    let at = |values: &[f64], i: usize| values.get(i).copied().unwrap_or(f64::NAN);
+    row.extend((0..table.drives.len()).map(|i| degrees(at(&state.drives_rad, i))));
+    for i in 0..table.traces.len() {
+        row.extend(state.traces_mm.get(i).copied().unwrap_or([f64::NAN; 3]));
+    }
+    if table.has_forces {
+        row.extend((0..table.drives.len()).map(|i| at(&state.torques_n_mm, i)));
+        row.extend([state.energy_n_mm, state.stress_max_mpa]);
     }
     for i in 0..table.bodies.len() {
         let (translation, rotation) = state.poses.get(i).copied().unwrap_or(([f64::NAN; 3], [f64::NAN; 3]));
-        for value in translation.into_iter().chain(rotation) {
-            number(out, value);
-        }
+        row.extend(translation.into_iter().chain(rotation));
     }
-    out.push('\n');
+    // −0 reads badly and means nothing here.
+    row.into_iter().map(|v| v.is_finite().then_some(if v == 0.0 { 0.0 } else { v })).collect()
 }
 
 /// Degrees, without the last-digit noise of the conversion (1e-12° is far below any step).
@@ -95,22 +101,18 @@ fn degrees(rad: f64) -> f64 {
     (rad.to_degrees() * 1e12).round() / 1e12
 }
 
-fn column(out: &mut String, name: &str) {
-    out.push(',');
+fn separate(out: &mut String, column: usize) {
+    if column > 0 {
+        out.push(',');
+    }
+}
+
+fn text(out: &mut String, name: &str) {
     // Names come from identifiers; anything else is quoted as CSV wants it.
     if name.contains([',', '"', '\n', '\r']) {
         let _ = write!(out, "\"{}\"", name.replace('"', "\"\""));
     } else {
         out.push_str(name);
-    }
-}
-
-/// Absent values stay empty: CSV has no not-a-number.
-fn number(out: &mut String, value: f64) {
-    out.push(',');
-    if value.is_finite() {
-        // −0 reads badly and means nothing here.
-        let _ = write!(out, "{:?}", if value == 0.0 { 0.0 } else { value });
     }
 }
 

@@ -77,11 +77,7 @@ impl Stages for Compiler {
         let cycle = sweep(&model).map_err(|e| lost(design, &e))?;
         let states = cycle.states.iter().enumerate().map(|(s, e)| MotionState {
             drives_rad: layout.drives.iter().map(|d| d.values_rad[s]).collect(),
-            traces_mm: layout
-                .traces
-                .iter()
-                .map(|t| e.state.poses[t.body].point(&t.rest).into())
-                .collect(),
+            traces_mm: layout.traces.iter().map(|t| e.state.poses[t.body].point(&t.rest).into()).collect(),
             torques_n_mm: (0..layout.drives.len()).map(|d| e.torque_n_mm(&model, d)).collect(),
             energy_n_mm: e.energy_n_mm,
             stress_max_mpa: e.max_stress_mpa(&model),
@@ -234,16 +230,20 @@ fn judge(design: &Design, layout: &Layout, cycle: &Cycle) -> Vec<Diagnostic> {
     let saddles: Vec<String> =
         cycle.states.iter().enumerate().filter(|(_, e)| !e.stable).map(|(s, _)| s.to_string()).collect();
     if !saddles.is_empty() {
-        let message = format!("the mechanism would buckle: no stable equilibrium at state {}", saddles.join(", "));
+        let message =
+            format!("the mechanism would buckle: no stable equilibrium at state {}", saddles.join(", "));
         found.push(
             Diagnostic::warning("W0603", message, design.origin)
                 .help("thicken or shorten the flexures that work in compression"),
         );
     }
     if let (true, Some(first), Some(last)) = (layout.closed, cycle.states.first(), cycle.states.last()) {
-        let apart = first.state.poses.iter().zip(&last.state.poses).map(|(a, b)| {
-            (a.translation - b.translation).norm().max((a.rotation - b.rotation).norm())
-        });
+        let apart = first
+            .state
+            .poses
+            .iter()
+            .zip(&last.state.poses)
+            .map(|(a, b)| (a.translation - b.translation).norm().max((a.rotation - b.rotation).norm()));
         if apart.fold(0.0, f64::max) > RETURNED {
             found.push(
                 Diagnostic::warning("W0604", "after a whole cycle the mechanism is not where it began", design.origin)

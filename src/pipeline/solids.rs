@@ -49,7 +49,8 @@ fn parts_input(design: &Design, layout: &Layout, motion: &Motion, model: &Model)
                 })
             };
             let skeleton = body.skeleton.iter().map(|p| drawn(p.position)).filter(|p| !flexed(p));
-            let eyes = design.joints.iter().enumerate().filter(|(_, j)| !j.is_compliant() && j.bodies.contains(&b));
+            let eyes =
+                design.joints.iter().enumerate().filter(|(_, j)| !j.is_compliant() && j.bodies.contains(&b));
             BodySolid {
                 name: body.name.clone(),
                 level_mm: f64::from(body.layer) * pitch,
@@ -167,10 +168,9 @@ fn collision(design: &Design, worst: &LeastGap) -> Diagnostic {
 fn fusion(design: &Design, f: &Fusion) -> Diagnostic {
     let name = |m: &Member| match *m {
         Member::Body(b) => (format!("`{}`", design.bodies[b].name), design.bodies[b].origin),
-        Member::Flexure(r) => (
-            format!("the flexure `{}`", design.rods[r].path),
-            design.joints[design.rods[r].joint].origin,
-        ),
+        Member::Flexure(r) => {
+            (format!("the flexure `{}`", design.rods[r].path), design.joints[design.rods[r].joint].origin)
+        }
     };
     let ((a, at), (b, also)) = (name(&f.a), name(&f.b));
     let place = format!("near ({:.1}, {:.1}, {:.1}) mm", f.at.x, f.at.y, f.at.z);

@@ -113,7 +113,7 @@ impl Stages for Toy {
         Ok(Simulation {
             motion: MotionTable { states: vec![state; n], bodies, ..Default::default() },
             errors_mm: vec![vec![(values[0] - 1.0).abs(); n]],
-            least_gap_mm: None,
+            ..Simulation::default()
         })
     }
 
@@ -134,8 +134,9 @@ impl Stages for Toy {
         Ok(Solved { solution, interrupted, diagnostics: Vec::new() })
     }
 
-    fn mesh(&self, _: &Design, values: &[f64]) -> Result<Vec<Artefact>, Failed> {
-        Ok(vec![Artefact { name: "toy.stl".into(), bytes: values[0].to_le_bytes().to_vec() }])
+    fn mesh(&self, _: &Design, values: &[f64]) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
+        let part = Artefact { name: "toy.stl".into(), bytes: values[0].to_le_bytes().to_vec() };
+        Ok((vec![part], Vec::new()))
     }
 }
 
