@@ -490,6 +490,15 @@ fn too_much_is_an_error_not_a_hang() {
 }
 
 #[test]
+fn the_deepest_nesting_fits_a_small_stack() {
+    let chain: String = (0..1000).map(|i| format!("    let v{i} = abs(v{} + 1)\n", i + 1)).collect();
+    let text = format!("mechanism m {{\n{chain}    let v1000 = 1\n}}\n");
+    let work = move || run(&text).diagnostics.iter().any(|d| d.message.contains("nested"));
+    let thread = std::thread::Builder::new().stack_size(512 << 10).spawn(work).unwrap();
+    assert!(thread.join().unwrap());
+}
+
+#[test]
 fn the_result_does_not_depend_on_the_order_of_declarations() {
     let d = design(run(CHEBYSHEV));
     let line = "    let   half = 2.5 * r\n";

@@ -9,7 +9,7 @@ use crate::ir::FreeVariable;
 use crate::ir::expr::{ExprId, Node};
 use crate::syntax::ast::Expr;
 
-/// Most free variables; Jansen's leg has about 140.
+/// Most free variables; Chebyshev's linkage has 34, 17 a hinge.
 const MAX_FREE: usize = 1_000;
 
 impl<'a> Evaluator<'a> {
