@@ -136,8 +136,7 @@ fn bore(design: &Design, index: JointId, joint: &Joint, body: BodyId) -> Bore {
 /// Bodies that meet somewhere in the cycle: each pair once, at its worst state.
 pub fn collisions(design: &Design, parts: &Parts, poses: &[Vec<Pose>]) -> Vec<Diagnostic> {
     let count = design.bodies.len();
-    let pairs: Vec<(BodyId, BodyId)> =
-        (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j))).collect();
+    let pairs: Vec<(BodyId, BodyId)> = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j))).collect();
     let mut found = Vec::new();
     for pair in &pairs {
         let others: Vec<(BodyId, BodyId)> = pairs.iter().copied().filter(|p| p != pair).collect();
