@@ -1,5 +1,8 @@
 //! Elaboration: what the texts become, and what is said about texts that are wrong.
 
+// Test code may panic: that is how it fails.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 mod common;
 
 use common::annotated;
@@ -237,6 +240,26 @@ fn tidy(v: &mut serde_json::Value) {
 }
 
 #[test]
+fn every_standard_material_and_process_elaborates() {
+    for module in flexura::elaborate::std_modules() {
+        let name = module.rsplit('.').next().unwrap();
+        let text = match module.split('.').next().unwrap() {
+            "materials" => CHEBYSHEV
+                .replace("use std.materials.rigur", &format!("use std.{module}"))
+                .replace("material rigur", &format!("material {name}"))
+                .replace("rigur.strength / 1.5", &format!("{name}.E / 100")),
+            "processes" => CHEBYSHEV
+                .replace("use std.processes.polyjet", &format!("use std.{module}"))
+                .replace("print on polyjet", &format!("print on {name}")),
+            "motors" => CHEBYSHEV.replace("nema17", name),
+            "flexures" => CHEBYSHEV.replace("crossed_leaves", name),
+            other => panic!("a folder without a test: {other}"),
+        };
+        design(run(&text));
+    }
+}
+
+#[test]
 fn the_target_sample_gives_exactly_what_is_not_available_yet() {
     assert_eq!(
         found(&run(SAMPLE)),
@@ -291,7 +314,7 @@ fn settings_that_are_wrong_are_errors() {
         (("rr", "3 mm"), "E0114 there is nothing to set by the name `rr`"),
         (("half", "3 mm"), "E0114 there is nothing to set by the name `half`"),
         (("knee.wide", "3 mm"), "E0114 there is nothing to set by the name `knee.wide`"),
-        (("r", "20"), "E0202 length: a length (mm) needs a unit"),
+        (("r", "20"), "E0202 a length (mm) is needed, this number has no unit"),
         (("r", ""), "E0115 `` is not a value for `r`"),
         (("r", "3 mm\n    let x = 2"), "E0115 `3 mm\n    let x = 2` is not a value for `r`"),
         (("r", "3 mm } mechanism m {"), "E0115 `3 mm } mechanism m {` is not a value for `r`"),
@@ -376,7 +399,7 @@ fn five_independent_mistakes_give_five_errors() {
         .replace("track(tip", "track(tap");
     let e = run(&text);
     let codes: Vec<_> = e.diagnostics.iter().map(|d| d.code.as_str()).collect();
-    assert_eq!(codes, ["E0202", "E0101", "E0101", "E0101"], "{:?}", found(&e));
+    assert_eq!(codes, ["E0202", "E0101", "E0207", "E0101", "E0101"], "{:?}", found(&e));
 }
 
 #[test]
@@ -431,20 +454,48 @@ fn expressions_have_right_derivatives() {
 
 #[test]
 fn too_much_is_an_error_not_a_hang() {
-    let chain: String = (0..5000).map(|i| format!("    let v{i} = v{} + 1\n", i + 1)).collect();
-    let long = format!("mechanism m {{\n{chain}    let v5000 = 1\n}}\n");
-    let e = run(&long);
+    let wrap = |body: &str| format!("mechanism m {{\n{body}}}\n");
+    let lines = |n: usize, f: &dyn Fn(usize) -> String| (0..n).map(f).collect::<String>();
+    let chain = lines(5000, &|i| format!("    let v{i} = v{} + 1\n", i + 1));
+    let rod = "    rod R {\n        from a at cyl(1 mm, 0 deg) along cyl(1 mm, 0 deg)\n        to b at cyl(1 mm, 0 deg) along cyl(1 mm, 0 deg)\n        section round(1 mm)\n    }\n";
+    let template = format!(
+        "flexure big replaces hinge {{\n{}{}}}\n",
+        lines(2000, &|i| format!("    let v{i} = {i}.5 mm * 2\n")),
+        lines(100, &|i| rod.replace('R', &format!("r{i}")))
+    );
+    let joints =
+        "    point O = (0 mm, 0 mm)\n    ground g { O }\n    link l { O }\n    point Q = (1 mm, 0 mm)\n"
+            .to_string()
+            + &lines(256, &|i| {
+                format!("    hinge h{i}: g to l at {} as big\n", if i % 2 == 0 { "O" } else { "Q" })
+            });
+    for (what, text) in [
+        ("chain", wrap(&format!("{chain}    let v5000 = 1\n"))),
+        ("deep", wrap(&format!("    let v = {}1{}\n", "(".repeat(20_000), ")".repeat(20_000)))),
+        ("sum", wrap(&format!("    let v = 1{}\n", " + 1".repeat(20_000)))),
+        ("many", wrap(&lines(30_000, &|i| format!("    let v{i} = {i}.5 mm * 2\n")))),
+        ("unknown", wrap(&lines(20_000, &|i| format!("    let v{i} = w{i}\n")))),
+        ("points", wrap(&format!("    ground g {{ {} Q }}\n", lines(50_000, &|i| format!("P{i}, "))))),
+        ("template", template + &wrap(&joints)),
+    ] {
+        let begin = std::time::Instant::now();
+        let e = run(&text);
+        println!("{what}: {:?}, {} findings", begin.elapsed(), e.diagnostics.len());
+        assert!(e.design.is_none(), "{what}");
+        assert!(e.diagnostics.len() <= 101, "{what}");
+        assert!(begin.elapsed().as_secs() < 20, "{what}");
+    }
+    let e = run(&wrap(&format!("{chain}    let v5000 = 1\n")));
     assert!(e.diagnostics.iter().any(|d| d.code == codes::TOO_LARGE && d.message.contains("nested")));
-    let deep = format!("mechanism m {{\n    let v = {}1{}\n}}\n", "(".repeat(20_000), ")".repeat(20_000));
-    assert!(run(&deep).design.is_none());
-    let many: String = (0..30_000).map(|i| format!("    let v{i} = {i}.5 mm * 2\n")).collect();
-    let e = run(&format!("mechanism m {{\n{many}}}\n"));
-    assert!(found(&e).iter().any(|f| f.starts_with(codes::TOO_LARGE)), "{:?}", found(&e));
-    let unknown: String = (0..20_000).map(|i| format!("    let v{i} = w{i}\n")).collect();
-    let e = run(&format!("mechanism m {{\n{unknown}}}\n"));
-    assert!(e.diagnostics.len() < 200);
-    let points: String = (0..50_000).map(|i| format!("P{i}, ")).collect();
-    assert!(run(&format!("mechanism m {{\n    ground g {{ {points} Q }}\n}}\n")).design.is_none());
+}
+
+#[test]
+fn the_deepest_nesting_fits_a_small_stack() {
+    let chain: String = (0..1000).map(|i| format!("    let v{i} = abs(v{} + 1)\n", i + 1)).collect();
+    let text = format!("mechanism m {{\n{chain}    let v1000 = 1\n}}\n");
+    let work = move || run(&text).diagnostics.iter().any(|d| d.message.contains("nested"));
+    let thread = std::thread::Builder::new().stack_size(512 << 10).spawn(work).unwrap();
+    assert!(thread.join().unwrap());
 }
 
 #[test]

@@ -46,7 +46,8 @@ fn torque_is_the_derivative_of_the_energy() {
         let mut worst = 0.0f64;
         let mut largest = 0.0f64;
         for s in 1..steps {
-            let difference = (states[s + 1].energy_n_mm - states[s - 1].energy_n_mm) / (alpha[s + 1] - alpha[s - 1]);
+            let difference =
+                (states[s + 1].energy_n_mm - states[s - 1].energy_n_mm) / (alpha[s + 1] - alpha[s - 1]);
             let torque = states[s].torque_n_mm(&model, 0);
             worst = worst.max((torque - difference).abs());
             largest = largest.max(torque.abs());
@@ -123,7 +124,8 @@ fn states_by_parameters_against_differences() {
                 let Some(first) = body.first_dof else { continue };
                 for c in 0..3 {
                     let value = |k: usize| shifted[k].states[s].state.poses[b].translation[c];
-                    let difference = (value(0) - 8.0 * value(1) + 8.0 * value(2) - value(3)) / (12.0 * step(i));
+                    let difference =
+                        (value(0) - 8.0 * value(1) + 8.0 * value(2) - value(3)) / (12.0 * step(i));
                     let exact = sensitivity.links[(first + c, i)];
                     worst = worst.max((exact - difference).abs() * width / layout.length_mm);
                 }

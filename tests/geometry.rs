@@ -9,6 +9,7 @@ use flexura::geometry::{
 };
 use nalgebra::Vector3;
 
+#[allow(clippy::unwrap_used)]
 fn build(bulge_deg: f64) -> (PartsInput, Parts) {
     let input = input(bulge_deg, Facets::default());
     let parts = build_parts(&input).unwrap();

@@ -29,8 +29,8 @@ const ELSEWHERE: &[(&str, &str)] = &[
 /// Functions of the target language that this version does not have.
 const LATER: &[&str] = &["sph", "angle", "rect", "path", "mirror", "turn"];
 
-/// Relative size of a rounding error in h² that still counts as touching circles. Measured: tangent
-/// circles drawn from decimal numbers give |h²|/r² up to 4e-16.
+/// Circles that miss by less than this part of their radii touch: room for a few hundred roundings
+/// (1.1e-16 each) in the points they are drawn from.
 const TANGENT: f64 = 1e-13;
 
 impl<'a> Evaluator<'a> {

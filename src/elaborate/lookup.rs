@@ -9,10 +9,18 @@ use crate::diagnostic::{Diagnostic, Origin};
 use crate::syntax::ast::Ident;
 use std::collections::BTreeMap;
 
+fn unknown_value(name: &Ident) -> Diagnostic {
+    Diagnostic::error(codes::UNKNOWN_NAME, format!("`{}` is not declared", name.node), name.at)
+}
+
 impl<'a> Evaluator<'a> {
     /// A name that should be a value.
     pub(super) fn unknown_name<T>(&mut self, scope: usize, name: &Ident) -> Outcome<T> {
         let Some(s) = self.scopes.get(scope) else { return Err(super::eval::Failed) };
+        if self.out.len() > super::MAX_FINDINGS {
+            // So much is wrong that looking for suggestions takes longer than it helps.
+            return self.finish_unknown(unknown_value(name), name, &[]);
+        }
         let mut candidates: Vec<String> = s
             .locals
             .iter()
@@ -22,8 +30,7 @@ impl<'a> Evaluator<'a> {
         if let Some(m) = self.program.modules.get(s.module) {
             candidates.extend(m.names.keys().cloned());
         }
-        let d = Diagnostic::error(codes::UNKNOWN_NAME, format!("`{}` is not declared", name.node), name.at);
-        self.finish_unknown(d, name, &candidates)
+        self.finish_unknown(unknown_value(name), name, &candidates)
     }
 
     /// A suggestion, unless so much is wrong already that looking for one takes too long.
@@ -117,7 +124,7 @@ impl<'a> Evaluator<'a> {
             None => d.help(format!(
                 "there {}: {}",
                 if map.len() == 1 { "is" } else { "are" },
-                map.keys().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", ")
+                map.keys().take(12).map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", ")
             )),
         };
         self.fail(d)

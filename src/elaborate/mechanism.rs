@@ -57,8 +57,9 @@ impl<'a> Evaluator<'a> {
         let clearance = process.as_ref().map(|(_, p)| p.clearance_mm);
         let layers = self.layers(scope, &sheet, &s, clearance).ok();
         let mut rods = Vec::new();
-        if let (Some((item, _)), Some(layers)) = (&process, &layers) {
-            self.flexures(scope, module, &mut s, *item, layers.height_mm, &mut rods);
+        if let Some(layers) = &layers {
+            let process = process.as_ref().map(|(item, _)| *item);
+            self.flexures(scope, module, &mut s, process, layers.height_mm, &mut rods);
         }
         let cycle = match sheet.cycle {
             Some(_) => self.cycle(scope, &sheet, outside.steps).ok(),
@@ -137,7 +138,7 @@ impl<'a> Evaluator<'a> {
         scope: usize,
         module: usize,
         s: &mut Structure<'a>,
-        process: ItemRef,
+        process: Option<ItemRef>,
         layer_height_mm: f64,
         rods: &mut Vec<Rod>,
     ) {

@@ -4,9 +4,13 @@
 //! only the design. No I/O: files come in through [`Files`].
 
 mod arithmetic;
+mod check;
 pub mod codes;
 pub mod dimension;
+mod drives;
 mod eval;
+mod frames;
+mod free;
 mod functions;
 mod goals;
 mod graph;
@@ -15,6 +19,7 @@ mod lookup;
 mod mechanism;
 mod names;
 mod records;
+mod require;
 mod scope;
 mod settings;
 mod sheet;

@@ -26,7 +26,8 @@ pub struct Site<'s> {
     pub kind: &'s str,
     pub shorter_link_mm: f64,
     pub layer_height_mm: f64,
-    pub process: ItemRef,
+    /// None: wrong or missing, which has been reported.
+    pub process: Option<ItemRef>,
 }
 
 impl<'a> Evaluator<'a> {
@@ -172,18 +173,12 @@ impl<'a> Evaluator<'a> {
     fn given_names(&mut self, inner: usize, site: &Site<'_>, at: Origin) -> Outcome<()> {
         let shorter = self.constant(site.shorter_link_mm, at)?;
         let height = self.constant(site.layer_height_mm, at)?;
-        let length = |id| Value::Scalar(Scalar { id, dim: Dimension::LENGTH });
-        for (name, value) in [
-            ("shorter_link", length(shorter)),
-            ("layer_height", length(height)),
-            ("process", Value::Record(site.process)),
-        ] {
-            let local = Local {
-                name: name.into(),
-                at: Origin::default(),
-                kind: LocalKind::Given,
-                state: State::Done(value),
-            };
+        let length = |id| State::Done(Value::Scalar(Scalar { id, dim: Dimension::LENGTH }));
+        let process = site.process.map_or(State::Failed, |item| State::Done(Value::Record(item)));
+        for (name, state) in
+            [("shorter_link", length(shorter)), ("layer_height", length(height)), ("process", process)]
+        {
+            let local = Local { name: name.into(), at: Origin::default(), kind: LocalKind::Given, state };
             self.declare(inner, local);
         }
         Ok(())

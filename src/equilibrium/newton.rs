@@ -133,8 +133,7 @@ impl Solver {
             if residual.small() {
                 let stable = self.factor(model, &state, true);
                 let energy_n_mm = self.systems.iter().map(|s| s.energy()).sum();
-                let strains =
-                    model.rods.iter().zip(&self.systems).map(|(r, s)| s.strains(&r.rod)).collect();
+                let strains = model.rods.iter().zip(&self.systems).map(|(r, s)| s.strains(&r.rod)).collect();
                 return Ok(Equilibrium { state, stable, energy_n_mm, strains, iterations: iteration });
             }
             self.factor(model, &state, false);
@@ -158,7 +157,8 @@ impl Solver {
             system.assemble(&rod.rod, rod_state, &state.poses[a], &state.poses[b]);
             internal = internal.max(system.internal_residual_norm());
             largest = largest.max(system.largest_internal_force());
-            least_stiffness = least_stiffness.min(rod.rod.least_bending_stiffness() / rod.rod.length_mm().powi(2));
+            least_stiffness =
+                least_stiffness.min(rod.rod.least_bending_stiffness() / rod.rod.length_mm().powi(2));
             floor = floor.max(system.rounding_floor(&rod.rod, rod_state));
             scatter(model, rod.bodies, system.link_gradient(), &mut gradient);
         }
@@ -189,13 +189,13 @@ impl Solver {
         for c in &model.layout.constraints {
             c.residual(&state.poses, &mut residual);
             c.jacobian(&state.poses, &mut self.jacobian);
-            for r in 0..c.rows() {
+            for (r, value) in residual.iter().enumerate().take(c.rows()) {
                 let mut gradient = SVector::<f64, 12>::zeros();
                 for k in 0..6 {
                     gradient[k] = self.jacobian.a[(r, k)];
                     gradient[6 + k] = self.jacobian.b[(r, k)];
                 }
-                f(row, c.bodies(), state.lambda[row], residual[r], self.scale[n + row], &gradient);
+                f(row, c.bodies(), state.lambda[row], *value, self.scale[n + row], &gradient);
                 row += 1;
             }
         }
@@ -254,7 +254,8 @@ impl Solver {
             }
         }
         let h_norm = (0..n).map(|i| k[(i, i)].abs()).fold(f64::MIN_POSITIVE, f64::max);
-        let j_norm = (n..n + m).flat_map(|i| (0..n).map(move |j| (i, j))).map(|ij| k[ij].abs()).fold(0.0, f64::max);
+        let j_norm =
+            (n..n + m).flat_map(|i| (0..n).map(move |j| (i, j))).map(|ij| k[ij].abs()).fold(0.0, f64::max);
         for i in n..n + m {
             k[(i, i)] = -REDUNDANCY * j_norm * j_norm / h_norm;
         }
@@ -340,8 +341,7 @@ impl Solver {
                 let mut internal = system.back_substitute(&d_link).to_vec();
                 internal.iter_mut().for_each(|v| *v *= fraction);
                 let [a, b] = rod.bodies;
-                turned |=
-                    rod.rod.retract(rod_state, &internal, &next.poses[a], &next.poses[b]).is_err();
+                turned |= rod.rod.retract(rod_state, &internal, &next.poses[a], &next.poses[b]).is_err();
             }
             if !turned {
                 for (l, d) in next.lambda.iter_mut().zip(step.rows(n, model.rows()).iter()) {

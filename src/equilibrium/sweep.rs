@@ -32,12 +32,10 @@ pub struct SweepError {
 /// [`SweepError`] at the first state that no step size reaches.
 pub fn sweep(model: &Model) -> Result<Cycle, SweepError> {
     let count = model.layout.states();
-    let target = |s: usize| -> Vec<f64> {
-        model.layout.drives.iter().map(|d| d.values_rad[s] - d.rest_rad).collect()
-    };
+    let target =
+        |s: usize| -> Vec<f64> { model.layout.drives.iter().map(|d| d.values_rad[s] - d.rest_rad).collect() };
     let distance = |s: usize| target(s).iter().map(|v| v * v).sum::<f64>();
-    let nearest =
-        (0..count).min_by(|a, b| distance(*a).total_cmp(&distance(*b))).unwrap_or(0);
+    let nearest = (0..count).min_by(|a, b| distance(*a).total_cmp(&distance(*b))).unwrap_or(0);
 
     let mut solver = Solver::new(model);
     let start = Walker::at_rest(model, &mut solver);
@@ -54,8 +52,7 @@ pub fn sweep(model: &Model) -> Result<Cycle, SweepError> {
         }
         Ok(out)
     };
-    let (forward, backward) =
-        rayon::join(|| run(&mut (nearest + 1..count)), || run(&mut (0..nearest).rev()));
+    let (forward, backward) = rayon::join(|| run(&mut (nearest + 1..count)), || run(&mut (0..nearest).rev()));
     let mut states = backward?;
     states.reverse();
     states.push(middle);

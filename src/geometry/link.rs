@@ -37,6 +37,8 @@ const ROUND_MM: f64 = 0.8;
 const STUB_ROUND_MM: f64 = 0.5;
 /// Wall round a bore, mm; the process's least wall if that is more.
 const BORE_WALL_MM: f64 = 2.0;
+/// Kept beyond the clearance, so that rounding cannot eat it, mm.
+const CLEAR_MM: f64 = 0.01;
 /// Next to its attachment a flexure may be nearer to its own link's bars than the clearance, mm.
 const OWN_ROOT_MM: f64 = 2.0;
 /// Points nearer than this in plan are one node, mm.
@@ -223,7 +225,7 @@ impl Builder<'_> {
             center: eye.point + self.axis() * middle,
             radius: radius_of(&eye.bore),
             half_height: share / 2.0,
-            keep_out: others.map(|e| radius_of(&e.bore)).fold(0.0, f64::max) + c,
+            keep_out: others.map(|e| radius_of(&e.bore)).fold(0.0, f64::max) + c + CLEAR_MM,
         }
     }
 

@@ -6,6 +6,7 @@
 //! | `parts` | the input, the grouping into printed parts, the build |
 //! | `link`, `skeleton` | a body as stubs, bosses, bars, eyes and risers |
 //! | `slot`, `sweep` | meshes of the primitives and of flexures |
+//! | `tidy` | removal of tiny edges before rounding to `f32` |
 //! | `union` | the boolean kernel's only client |
 //! | `mesh`, `check`, `ray` | triangle meshes, their facts, measurements on them |
 //! | `distance`, `gap` | least distances, overlaps in the rest pose, gaps over a cycle |
@@ -20,6 +21,7 @@ pub mod ray;
 pub mod skeleton;
 pub mod slot;
 pub mod sweep;
+pub mod tidy;
 pub mod union;
 
 #[cfg(test)]

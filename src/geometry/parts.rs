@@ -9,7 +9,7 @@ use super::gap::{Fusion, fusions};
 use super::link::{BodyPlan, plan_body};
 use super::mesh::Mesh;
 use super::slot::Facets;
-use super::sweep::SECTION_FACETS;
+use super::tidy::{SHORT_EDGE_MM, without_short_edges};
 use super::union::{BooleanError, subtract_all, union_all};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -223,8 +223,9 @@ fn build_part(input: &PartsInput, plans: &[BodyPlan], bodies: &[usize]) -> Resul
         .collect::<Result<_, BooleanError>>()
         .map_err(failed)?;
     let inside = |f: &&FlexureSolid| bodies.contains(&f.bodies.0);
-    solids.extend(input.flexures.iter().filter(inside).map(|f| f.mesh(SECTION_FACETS)));
-    let mesh = union_all(&solids).map_err(failed)?.rounded_to_f32();
+    solids.extend(input.flexures.iter().filter(inside).map(|f| f.mesh(input.facets.around)));
+    let united = union_all(&solids).map_err(failed)?;
+    let mesh = without_short_edges(&united, SHORT_EDGE_MM).rounded_to_f32().sorted();
     let notes = bodies.iter().flat_map(|i| plans[*i].notes.iter().cloned()).collect();
     Ok(Part { name, bodies: bodies.to_vec(), mesh, notes })
 }

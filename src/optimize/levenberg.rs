@@ -6,9 +6,7 @@ use super::box_qp::minimize_in_box;
 use super::normal::Normal;
 use super::problem::{Problem, Trial};
 use super::run::Shared;
-use argmin::core::{
-    Error, IterState, KV, Problem as Counted, Solver, TerminationReason, TerminationStatus,
-};
+use argmin::core::{Error, IterState, KV, Problem as Counted, Solver, TerminationReason, TerminationStatus};
 use nalgebra::DVector;
 
 /// The state argmin carries: position in the unit box, gradient, nothing else of its own.
@@ -102,8 +100,7 @@ impl<'d> Solver<&Problem<'d>, LmState> for LevenbergMarquardt<'_, 'd> {
             if promised <= f64::EPSILON * trial.cost {
                 break;
             }
-            let x: Vec<f64> =
-                trial.x.iter().zip(step.iter()).map(|(x, d)| (x + d).clamp(0.0, 1.0)).collect();
+            let x: Vec<f64> = trial.x.iter().zip(step.iter()).map(|(x, d)| (x + d).clamp(0.0, 1.0)).collect();
             let next = problem.problem("simulations", |p| Ok(p.simulate(&x)))?;
             let ratio = next.as_ref().map_or(-1.0, |n| (trial.cost - n.cost) / promised);
             if ratio > ACCEPT
@@ -134,8 +131,7 @@ impl<'d> Solver<&Problem<'d>, LmState> for LevenbergMarquardt<'_, 'd> {
         }
         let start = self.history.first().copied().unwrap_or(0.0);
         let before = self.history.len().checked_sub(1 + WINDOW).map(|i| self.history[i]);
-        let settled =
-            before.is_some_and(|b| b - state.get_cost() <= (FALL * b).max(FALL_OF_START * start));
+        let settled = before.is_some_and(|b| b - state.get_cost() <= (FALL * b).max(FALL_OF_START * start));
         if self.stuck || settled {
             return TerminationStatus::Terminated(TerminationReason::SolverConverged);
         }

@@ -1,6 +1,6 @@
 //! The optimisation problem in the unit box: x = (p − lower) / (upper − lower).
 
-use super::guards::Guards;
+use super::guards;
 use super::normal::Normal;
 use super::objectives::{self, Objective, StateView};
 use crate::equilibrium::{Cycle, Layout, Model, SensitivityWorkspace, sweep};
@@ -13,7 +13,6 @@ pub struct Problem<'d> {
     design: &'d Design,
     layout: &'d Layout,
     objectives: Vec<Box<dyn Objective>>,
-    guards: Guards,
     edges: usize,
     simulations: AtomicUsize,
 }
@@ -59,7 +58,6 @@ impl<'d> Problem<'d> {
             design,
             layout,
             objectives: objectives::build(design),
-            guards: Guards,
             edges,
             simulations: AtomicUsize::new(0),
         }
@@ -116,7 +114,7 @@ impl<'d> Problem<'d> {
             .iter()
             .map(|o| (0..self.layout.counted_states()).map(|s| o.cost(&self.view(&model, &cycle, s))).sum())
             .collect();
-        terms.push(self.guards.cost(&model));
+        terms.push(guards::cost(&model));
         let cost: f64 = terms.iter().sum();
         cost.is_finite().then(|| Trial { x: x.to_vec(), model, cycle, cost, terms })
     }
@@ -156,7 +154,7 @@ impl<'d> Problem<'d> {
         for part in parts {
             sum.merge(&part?);
         }
-        self.guards.accumulate(&trial.model, &mut sum);
+        guards::accumulate(&trial.model, &mut sum);
         sum.complete();
         for (i, f) in self.design.free.iter().enumerate() {
             let width = f.upper - f.lower;

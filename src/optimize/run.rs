@@ -134,13 +134,9 @@ pub fn optimize<'d>(
     let simulations = shared.problem.simulations();
     match best {
         // The start itself is returned as it was given, not through the unit box.
-        Some((cost, x)) if x != shared.problem.to_unit(start) => Optimized {
-            p: shared.problem.to_parameters(&x),
-            cost,
-            iterations,
-            simulations,
-            ending,
-        },
+        Some((cost, x)) if x != shared.problem.to_unit(start) => {
+            Optimized { p: shared.problem.to_parameters(&x), cost, iterations, simulations, ending }
+        }
         Some((cost, _)) => Optimized { p: start.to_vec(), cost, iterations, simulations, ending },
         None => Optimized {
             p: start.to_vec(),

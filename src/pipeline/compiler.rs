@@ -145,7 +145,10 @@ impl Stages for Compiler {
     fn mesh(&self, design: &Design, values: &[f64]) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
         let (layout, motion) = layout(design, values)?;
         let model = Model::new(design, &layout, values, MESH_EDGES, false).map_err(|e| no_rod(design, &e))?;
-        let (parts, found) = solids::build(design, &layout, &motion, &model)?;
+        let (parts, mut found) = solids::build(design, &layout, &motion, &model)?;
+        let cycle = sweep(&model).map_err(|e| lost(design, &e))?;
+        let poses: Vec<Vec<Pose>> = cycle.states.iter().map(|e| e.state.poses.clone()).collect();
+        found.extend(solids::collisions(design, &parts, &poses));
         let mut artefacts = Vec::new();
         for part in &parts.parts {
             let bytes = stl_bytes(&part.mesh).map_err(|e| {

@@ -4,10 +4,12 @@ use super::stages::Failed;
 use crate::diagnostic::Diagnostic;
 use crate::equilibrium::{Layout, Model};
 use crate::geometry::{
-    BodySolid, Bore, Eye, Facets, FlexureSolid, Fusion, Member, Parts, PartsInput, build_parts,
+    BodySolid, Bore, Eye, Facets, FlexureSolid, Fusion, LeastGap, Member, Parts, PartsInput, build_parts,
+    least_gap,
 };
 use crate::ir::{BodyId, Design, Joint, JointId, Realization};
 use crate::kinematics::Motion;
+use crate::math::Pose;
 use nalgebra::Vector3;
 
 /// Points nearer than this are the same, mm.
@@ -129,6 +131,37 @@ fn bore(design: &Design, index: JointId, joint: &Joint, body: BodyId) -> Bore {
         Realization::Conventional { pin_diameter_mm: Some(d) } => Bore::Blind { diameter_mm: d + clearance },
         _ => Bore::Solid,
     }
+}
+
+/// Bodies that meet somewhere in the cycle: each pair once, at its worst state.
+pub fn collisions(design: &Design, parts: &Parts, poses: &[Vec<Pose>]) -> Vec<Diagnostic> {
+    let count = design.bodies.len();
+    let pairs: Vec<(BodyId, BodyId)> = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j))).collect();
+    let mut found = Vec::new();
+    for pair in &pairs {
+        let others: Vec<(BodyId, BodyId)> = pairs.iter().copied().filter(|p| p != pair).collect();
+        let worst = least_gap(&parts.plans, poses, &others)
+            .into_iter()
+            .flatten()
+            .min_by(|a, b| a.gap_mm.total_cmp(&b.gap_mm));
+        if let Some(worst) = worst.filter(|w| w.gap_mm < 0.0) {
+            found.push(collision(design, &worst));
+        }
+    }
+    found
+}
+
+fn collision(design: &Design, worst: &LeastGap) -> Diagnostic {
+    let (a, b) = (&design.bodies[worst.bodies.0], &design.bodies[worst.bodies.1]);
+    let at = worst.at;
+    let message = format!("`{}` and `{}` collide on the way", a.name, b.name);
+    Diagnostic::warning("W0635", message, a.origin)
+        .label(format!(
+            "at state {} they overlap by {:.2} mm near ({:.1}, {:.1}, {:.1}) mm",
+            worst.state, -worst.gap_mm, at.x, at.y, at.z
+        ))
+        .also(b.origin, "the other one")
+        .help("put them in different layers, or aim the flexures elsewhere with `into … toward …`")
 }
 
 fn fusion(design: &Design, f: &Fusion) -> Diagnostic {

@@ -53,6 +53,7 @@ mod section;
 mod sensitivity;
 #[cfg(test)]
 mod sensitivity_tests;
+mod shape;
 pub mod single;
 mod state;
 mod stencil;
@@ -63,6 +64,7 @@ pub use condense::FactorReport;
 pub use rest::{MIN_EDGES, PARAMETERS, RodError, RodParameters};
 pub use section::{RodMaterial, Stiffness, ellipse_stiffness};
 pub use sensitivity::{ParameterMatrix, SensitivityError};
+pub use shape::{LARGEST_CURVATURE, LEAST_SLENDERNESS, LEAST_SPEED};
 pub use state::{RetractError, RodState};
 pub use stress::{
     RodDirections, SECTION_POINTS, STATION_VALUES, StationStrain, StrainJacobian, StressSample,

@@ -95,7 +95,7 @@ fn leaf(
 /// Crossed leaves at a joint: directions into the two bodies (degrees), half angle and radius of
 /// the attachments, bulge of the leaves (0: straight).
 #[allow(clippy::too_many_arguments)]
-fn crossed_leaves(
+pub fn crossed_leaves(
     name: &str,
     joint: usize,
     at: Vector3<f64>,

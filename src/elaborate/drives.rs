@@ -1,0 +1,166 @@
+//! Drives and their rest values.
+
+use super::codes;
+use super::dimension::Dimension;
+use super::eval::{Env, Evaluator, Failed, Outcome};
+use super::sheet::{DriveText, Sheet};
+use super::structure::Structure;
+use crate::diagnostic::Diagnostic;
+use crate::ir::{Drive, MotorInterface, Profile};
+use crate::syntax::ast::{self, Expr, ExprKind, Ident};
+
+impl<'a> Evaluator<'a> {
+    pub(super) fn drives(
+        &mut self,
+        scope: usize,
+        module: usize,
+        sheet: &Sheet<'a>,
+        s: &Structure<'a>,
+    ) -> Outcome<Vec<Drive>> {
+        let mut out: Vec<Drive> = Vec::new();
+        let mut ok = Ok(());
+        let at = sheet.drives.get(1).map(|d| d.at).or(sheet.rests.get(1).map(|r| r.2)).unwrap_or_default();
+        self.limit(sheet.drives.len().max(sheet.rests.len()), "drives", at)?;
+        for text in &sheet.drives {
+            match self.drive(scope, module, text, s, &out) {
+                Ok(d) => out.push(d),
+                Err(Failed) => ok = Err(Failed),
+            }
+        }
+        for (i, (name, value, at)) in sheet.rests.iter().enumerate() {
+            if sheet.later && !self.is_declared(scope, name) {
+                // It may be the value of a statement that is not available yet.
+                ok = Err(Failed);
+                continue;
+            }
+            let rest = self.rest(scope, name, value);
+            let earlier = sheet.rests.iter().take(i).find(|(n, ..)| n.node == name.node);
+            if let Some((_, _, first)) = earlier {
+                ok = self.fail(
+                    Diagnostic::error(
+                        codes::REPEATED,
+                        format!("`rest {}` may stand only once", name.node),
+                        *at,
+                    )
+                    .label("again here")
+                    .also(*first, "first here"),
+                );
+                continue;
+            }
+            let Ok(joint) = self.thing(scope, &s.joint_index, name, "joint") else {
+                ok = Err(Failed);
+                continue;
+            };
+            match out.iter_mut().find(|d| d.joint == joint) {
+                Some(drive) => match rest {
+                    Ok(v) => drive.rest_rad = v,
+                    Err(Failed) => ok = Err(Failed),
+                },
+                // A drive that is wrong itself has been reported.
+                None if sheet.drives.iter().any(|d| d.joint.node == name.node) => ok = Err(Failed),
+                None => {
+                    ok = self.fail(
+                        Diagnostic::error(
+                            codes::REST,
+                            format!("joint `{}` is not driven", name.node),
+                            name.at,
+                        )
+                        .help("`rest` says at which value of its drive the part is printed"),
+                    );
+                }
+            }
+        }
+        ok.map(|()| out)
+    }
+
+    fn is_declared(&self, scope: usize, name: &Ident) -> bool {
+        self.scopes.get(scope).is_some_and(|s| s.index.contains_key(&name.node))
+    }
+
+    fn rest(&mut self, scope: usize, name: &Ident, value: &'a Expr) -> Outcome<f64> {
+        if let ExprKind::Free { .. } = value.kind {
+            return self.fail(
+                Diagnostic::error(codes::LATER_FREE, "a free rest pose is not available yet", value.at)
+                    .help(format!("write a number: `rest {} at 30 deg`", name.node)),
+            );
+        }
+        let id = self.eval_scalar(&Env::fixed(scope), value, Dimension::ANGLE, "the rest value")?;
+        if self.exprs.as_constant(id).is_none()
+            && let Some(at) = self.free_behind(id)
+        {
+            return self.fail(
+                Diagnostic::error(codes::LATER_FREE, "a free rest pose is not available yet", at)
+                    .label("this is free")
+                    .also(value.at, "the rest pose depends on it"),
+            );
+        }
+        self.fixed(id, value.at, "the rest value")
+    }
+
+    fn drive(
+        &mut self,
+        scope: usize,
+        module: usize,
+        text: &DriveText<'a>,
+        s: &Structure<'a>,
+        before: &[Drive],
+    ) -> Outcome<Drive> {
+        let joint = self.thing(scope, &s.joint_index, text.joint, "joint");
+        let profile = match text.profile {
+            ast::Profile::Range(from, to) => {
+                let a = self.eval_fixed(scope, from, Dimension::ANGLE, "the drive's start");
+                let b = self.eval_fixed(scope, to, Dimension::ANGLE, "the drive's end");
+                a.and_then(|a| Ok((a, b?)))
+            }
+            ast::Profile::Later(at) => self.fail(
+                Diagnostic::error(codes::LATER_STATEMENT, "a drive `by …` is not available yet", *at)
+                    .help("write `drive J from A to B`"),
+            ),
+        };
+        let motor = match text.motor {
+            None => Ok(None),
+            Some(name) => {
+                self.record_named(module, name, "motor").and_then(|item| self.motor(item).map(Some))
+            }
+        };
+        let (joint, (from_rad, to_rad), motor) = (joint?, profile?, motor?);
+        if let Some(first) = before.iter().find(|d| d.joint == joint) {
+            return self.fail(
+                Diagnostic::error(
+                    codes::REPEATED,
+                    format!("joint `{}` is driven twice", text.joint.node),
+                    text.at,
+                )
+                .label("again here")
+                .also(first.origin, "first here"),
+            );
+        }
+        let range = motor.as_ref().and_then(|m| match m.interface {
+            MotorInterface::Stepper { .. } => None,
+            MotorInterface::Pwm { range_rad } | MotorInterface::Dynamixel { range_rad } => Some(range_rad),
+        });
+        if let Some(range) = range
+            && !text.continuous
+            && (to_rad - from_rad).abs() > range * (1.0 + 1e-9)
+        {
+            return self.fail(
+                Diagnostic::error(codes::MOTOR_RANGE, "the drive goes beyond its motor's range", text.at)
+                    .label(format!(
+                        "turns {}, the motor {}",
+                        self.show((to_rad - from_rad).abs(), Dimension::ANGLE),
+                        self.show(range, Dimension::ANGLE)
+                    ))
+                    .help("if this motor turns without end, write `continuous` after its name"),
+            );
+        }
+        Ok(Drive {
+            name: text.joint.node.clone(),
+            joint,
+            profile: Profile::Range { from_rad, to_rad },
+            rest_rad: 0.0,
+            motor,
+            continuous: text.continuous,
+            origin: text.at,
+        })
+    }
+}

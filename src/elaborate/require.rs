@@ -1,0 +1,191 @@
+//! Requirements: queries over the solved cycle, compared with quantities.
+
+use super::codes;
+use super::dimension::Dimension;
+use super::eval::{Evaluator, Failed, Outcome};
+use super::sheet::RequireText;
+use crate::diagnostic::Diagnostic;
+use crate::ir::{Aggregate, Quantity, Requirement};
+use crate::syntax::ast::{Argument, Compare, Expr, ExprKind, Ident};
+use std::collections::BTreeMap;
+
+const AGGREGATES: &[&str] = &["max", "min", "mean", "span", "at"];
+const LATER_QUANTITIES: &[&str] = &["force", "tension", "gap", "buckling", "angle"];
+const QUANTITIES: &[&str] = &["error", "stress", "torque"];
+/// A query as written: `max(error(tip))`.
+struct Query<'a> {
+    outer: Option<&'a Ident>,
+    inner: &'a Ident,
+    inner_arguments: &'a [Argument],
+    time: Option<&'a Expr>,
+}
+
+impl<'a> Evaluator<'a> {
+    pub(super) fn requirement(
+        &mut self,
+        scope: usize,
+        text: &RequireText<'a>,
+        traces: &BTreeMap<String, usize>,
+        drives: &BTreeMap<String, usize>,
+        line: &str,
+    ) -> Outcome<Requirement> {
+        let queries = [query(text.left), query(text.right)];
+        let (found, bound, at_most) = match queries {
+            [Some(q), None] => (q, text.right, matches!(text.op, Compare::LessEqual | Compare::Less)),
+            [None, Some(q)] => (q, text.left, matches!(text.op, Compare::GreaterEqual | Compare::Greater)),
+            [Some(_), Some(_)] => {
+                return self.fail(
+                    Diagnostic::error(
+                        codes::LATER_TERM,
+                        "comparing two queries is not available yet",
+                        text.at,
+                    )
+                    .help("compare one query with a quantity"),
+                );
+            }
+            [None, None] => {
+                if let Some(outer) = output_query(text.left).or(output_query(text.right)) {
+                    return self.later(codes::LATER_TERM, &format!("{}(OUTPUT)", outer.node), outer.at);
+                }
+                if matches!(text.left.kind, ExprKind::Broken) || matches!(text.right.kind, ExprKind::Broken) {
+                    return Err(Failed);
+                }
+                return self.fail(
+                    Diagnostic::error(
+                        codes::QUERY,
+                        "nothing of the solved mechanism is asked for here",
+                        text.at,
+                    )
+                    .help("write for instance `require max(error(tip)) <= 1 mm`"),
+                );
+            }
+        };
+        let aggregate = self.aggregate(scope, &found);
+        let quantity = self.quantity(scope, found.inner, found.inner_arguments, traces, drives);
+        let (aggregate, (quantity, dim)) = (aggregate?, quantity?);
+        let bound = self.eval_fixed(scope, bound, dim, "the bound")?;
+        Ok(Requirement {
+            aggregate,
+            quantity,
+            at_most,
+            strict: matches!(text.op, Compare::Less | Compare::Greater),
+            bound,
+            text: line.to_string(),
+            origin: text.at,
+        })
+    }
+
+    fn aggregate(&mut self, scope: usize, q: &Query<'a>) -> Outcome<Aggregate> {
+        let Some(outer) = q.outer else {
+            return self.fail(
+                Diagnostic::error(
+                    codes::QUERY,
+                    "this has a value at every step, which one is meant?",
+                    q.inner.at,
+                )
+                .help(format!("write `max({}(…))`, or min, mean, span", q.inner.node)),
+            );
+        };
+        match outer.node.as_str() {
+            "max" => Ok(Aggregate::Max),
+            "min" => Ok(Aggregate::Min),
+            "mean" => Ok(Aggregate::Mean),
+            "span" => Ok(Aggregate::Span),
+            "at" => {
+                let Some(t) = q.time else {
+                    return self.fail(
+                        Diagnostic::error(codes::ARGUMENTS, "`at` lacks its time", outer.at)
+                            .help("write `at(error(tip), 25 %)`"),
+                    );
+                };
+                let v = self.eval_fixed(scope, t, Dimension::NUMBER, "the time")?;
+                if !(0.0..=1.0).contains(&v) {
+                    return self.fail(Diagnostic::error(
+                        codes::COUNT,
+                        "the time lies outside the cycle, 0 % to 100 %",
+                        t.at,
+                    ));
+                }
+                Ok(Aggregate::At(v))
+            }
+            _ => self.unknown_of(outer, "query", AGGREGATES),
+        }
+    }
+
+    fn quantity(
+        &mut self,
+        scope: usize,
+        name: &'a Ident,
+        args: &'a [Argument],
+        traces: &BTreeMap<String, usize>,
+        drives: &BTreeMap<String, usize>,
+    ) -> Outcome<(Quantity, Dimension)> {
+        match name.node.as_str() {
+            "error" => {
+                let slots = self.arguments(name, args, &["trace"], 1)?;
+                let trace = self.trace_argument(scope, slots.first().copied().flatten(), traces)?;
+                Ok((Quantity::Error(trace), Dimension::LENGTH))
+            }
+            "stress" => {
+                self.arguments(name, args, &[], 0)?;
+                Ok((Quantity::Stress, Dimension::STRESS))
+            }
+            "torque" => {
+                let slots = self.arguments(name, args, &["drive"], 1)?;
+                let drive = self.plain_name(slots.first().copied().flatten(), "drive")?;
+                Ok((Quantity::Torque(self.drive_named(scope, drive, drives)?), Dimension::TORQUE))
+            }
+            later => self.later(codes::LATER_TERM, later, name.at),
+        }
+    }
+
+    /// The drive of a joint by the joint's name.
+    pub(super) fn drive_named(
+        &mut self,
+        scope: usize,
+        name: &Ident,
+        drives: &BTreeMap<String, usize>,
+    ) -> Outcome<usize> {
+        if let Some(i) = drives.get(&name.node) {
+            return Ok(*i);
+        }
+        let joint = self.scopes.get(scope).and_then(|s| s.locals.get(*s.index.get(&name.node)?));
+        if joint.is_some_and(|l| matches!(l.kind, super::scope::LocalKind::Thing("joint"))) {
+            return self.fail(
+                Diagnostic::error(codes::WRONG_KIND, format!("joint `{}` is not driven", name.node), name.at)
+                    .label("the name of a driven joint is needed"),
+            );
+        }
+        self.thing(scope, drives, name, "drive")
+    }
+}
+
+/// `span(curl)`: the query of an `output`, which this version does not have.
+fn output_query(e: &Expr) -> Option<&Ident> {
+    match &e.kind {
+        ExprKind::Call { function, arguments } if matches!(function.node.as_str(), "span" | "mean") => {
+            let [only] = arguments.as_slice() else { return None };
+            matches!(only.value.kind, ExprKind::Name(_)).then_some(function)
+        }
+        _ => None,
+    }
+}
+
+/// Recognises a query by the quantity it asks for.
+fn query(e: &Expr) -> Option<Query<'_>> {
+    let ExprKind::Call { function, arguments } = &e.kind else { return None };
+    let known =
+        |n: &Ident| QUANTITIES.contains(&n.node.as_str()) || LATER_QUANTITIES.contains(&n.node.as_str());
+    if known(function) {
+        return Some(Query { outer: None, inner: function, inner_arguments: arguments, time: None });
+    }
+    let (first, rest) = arguments.split_first()?;
+    let ExprKind::Call { function: inner, arguments: inner_arguments } = &first.value.kind else {
+        return None;
+    };
+    if !known(inner) {
+        return None;
+    }
+    let time = rest.first().map(|a| &a.value);
+    Some(Query { outer: Some(function), inner, inner_arguments, time })
+}
