@@ -99,7 +99,7 @@ fn five_mistakes() -> (String, Vec<(usize, &'static str)>) {
         ("point O = (0 mm, 0 mm)", "point O = (0, 0 mm)", "E0202"),
         ("link   rocker  { B, D }", "lnik   rocker  { B, D }", "E0002"),
         ("drive motor from 0 deg to 360 deg", "drive motor from 0 mm to 360 deg", "E0201"),
-        ("export stl", "export slt", "E0101"),
+        ("export stl", "export slt", "E0110"),
     ];
     let mut broken = text;
     let mut expected = Vec::new();
