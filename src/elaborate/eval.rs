@@ -76,6 +76,8 @@ pub struct Evaluator<'a> {
     /// The limits are exceeded: this has been said, nothing more is evaluated.
     full: bool,
     pub(super) paths: BTreeSet<String>,
+    /// Words of statements that could not be understood: such a name may have been declared there.
+    pub(super) half_said: BTreeSet<String>,
     /// Where each node is: only looked up, never listed.
     interned: HashMap<(u8, u64, u64), ExprId>,
     /// Values of all nodes at the start values of the free variables, and those start values.
@@ -100,6 +102,7 @@ impl<'a> Evaluator<'a> {
             work: 0,
             full: false,
             paths: BTreeSet::new(),
+            half_said: BTreeSet::new(),
             interned: HashMap::new(),
             starts: (Vec::new(), Vec::new()),
         }

@@ -225,7 +225,7 @@ fn change_point(design: &Design, crossed: &[Vec<f64>]) -> Option<Diagnostic> {
         drive.name
     );
     Some(
-        Diagnostic::warning("E0506", message, drive.origin)
+        Diagnostic::warning("W0506", message, drive.origin)
             .label("a real mechanism may take the other way here")
             .help("change a length slightly, so that the loop never lies flat"),
     )
@@ -240,7 +240,7 @@ fn does_not_return(mechanism: &Mechanism, states: &[State]) -> Option<Diagnostic
     let drive = mechanism.design.drives.first()?;
     differs.then(|| {
         Diagnostic::warning(
-            "E0507",
+            "W0507",
             "after one cycle the mechanism is not in the pose it started from",
             drive.origin,
         )
