@@ -68,9 +68,9 @@ impl Gradient for Unbounded<'_, '_> {
     type Gradient = Vec<f64>;
 
     fn gradient(&self, z: &Vec<f64>) -> Result<Vec<f64>, Error> {
-        let normal = self.evaluate(z, |t| t.and_then(|t| self.shared.problem.differentiate(t)))?;
-        Ok(match normal {
-            Some(normal) => z.iter().zip(normal.gradient.iter()).map(|(z, g)| 0.5 * z.cos() * g).collect(),
+        let at = self.evaluate(z, |t| t.and_then(|t| self.shared.problem.differentiate(t)))?;
+        Ok(match at {
+            Some(at) => z.iter().zip(at.gradient().iter()).map(|(z, g)| 0.5 * z.cos() * g).collect(),
             None => z.iter().map(|z| z / FRAC_PI_2).collect(),
         })
     }

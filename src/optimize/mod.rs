@@ -10,7 +10,7 @@ pub mod objectives;
 mod problem;
 mod run;
 
-pub use box_qp::minimize_in_box;
+pub use box_qp::{Hinge, Quadratic};
 pub use normal::Normal;
-pub use problem::{Problem, Trial};
+pub use problem::{Derivatives, Problem, Trial};
 pub use run::{Ending, Iteration, Method, Optimized, optimize};
