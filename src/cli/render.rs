@@ -58,7 +58,7 @@ mod tests {
         let error = Diagnostic::error("E0001", "wrong", at);
         let warning = Diagnostic::warning("W0001", "doubtful", at);
         assert_eq!(counts(&[]), "");
-        assert_eq!(counts(&[error.clone()]), "1 error");
+        assert_eq!(counts(std::slice::from_ref(&error)), "1 error");
         assert_eq!(counts(&[error.clone(), warning, error]), "2 errors, 1 warning");
     }
 }
