@@ -2,6 +2,8 @@
 //! independence of the way, derivatives by the design parameters against differences.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#![allow(clippy::unwrap_used)]
+
 use flexura::elaborate::{Options, elaborate};
 use flexura::equilibrium::{Cycle, Layout, Model, SensitivityWorkspace, sweep};
 use flexura::ir::Design;

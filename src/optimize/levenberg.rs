@@ -4,7 +4,7 @@
 
 use super::box_qp::Quadratic;
 use super::problem::{Derivatives, Problem, Trial};
-use super::run::Shared;
+use super::shared::Shared;
 use argmin::core::{Error, IterState, KV, Problem as Counted, Solver, TerminationReason, TerminationStatus};
 use nalgebra::DVector;
 
