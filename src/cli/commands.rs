@@ -2,6 +2,7 @@
 
 use super::artefacts::{WriteError, write_atomic, write_below};
 use super::progress::Terminal;
+use super::render::tell;
 use super::sources::{Folder, read_text};
 use super::style::Style;
 use super::{Build, Common, Format, Simulate, human, render};
@@ -33,7 +34,7 @@ pub fn check(common: &Common) -> u8 {
             (Some(design), counts) if counts.is_empty() => {
                 print(&format!("{}: no errors\n", design.name));
             }
-            (_, counts) => eprintln!("{}: {counts}", common.source.display()),
+            (_, counts) => tell(&format!("{}: {counts}\n", common.source.display())),
         }
     }
     code(&out)
@@ -53,7 +54,7 @@ pub fn ir(common: &Common) -> u8 {
             match serde_json::to_string_pretty(design) {
                 Ok(text) => print(&format!("{text}\n")),
                 Err(e) => {
-                    eprintln!("error: {e}");
+                    tell(&format!("error: {e}\n"));
                     FAILED
                 }
             }
@@ -146,7 +147,7 @@ fn finish_build(out: BuildOutcome, format: Format, written: &[(String, usize)]) 
                 Some(_) => {
                     print(&human::report(&out, written, Style::stdout()));
                 }
-                None => eprintln!("{}", render::counts(&out.diagnostics)),
+                None => tell(&format!("{}\n", render::counts(&out.diagnostics))),
             }
         }
         Format::Json => {
@@ -207,7 +208,7 @@ fn stop_on_ctrl_c(say: impl Fn() + Send + 'static) -> Arc<AtomicBool> {
         say();
     };
     if let Err(e) = ctrlc::set_handler(handler) {
-        eprintln!("warning: Ctrl-C will not keep the best point: {e}");
+        tell(&format!("warning: Ctrl-C will not keep the best point: {e}\n"));
     }
     cancel
 }

@@ -5,18 +5,24 @@ use super::style::Style;
 use flexura::diagnostic::json::{JsonDiagnostic, diagnostics};
 use flexura::diagnostic::{Diagnostic, Severity, SourceMap, terminal};
 use serde_json::json;
+use std::io::Write;
 
 /// Columns where the standard error is no terminal.
 const WIDTH: usize = 100;
 /// Lines longer than this are hard to read on a wide terminal.
 const MOST_WIDTH: usize = 120;
 
+/// Writes to the standard error; a reader that went away is no reason to panic.
+pub fn tell(text: &str) {
+    let _ = std::io::stderr().lock().write_all(text.as_bytes());
+}
+
 /// Shows diagnostics on the standard error, for people.
 pub fn show(found: &[Diagnostic], sources: &SourceMap) {
     let width = terminal_size::terminal_size_of(std::io::stderr())
         .map_or(WIDTH, |(width, _)| usize::from(width.0).min(MOST_WIDTH));
     let style = terminal::Style { color: Style::stderr().is_coloured(), width };
-    eprint!("{}", terminal::render(found, sources, style));
+    tell(&terminal::render(found, sources, style));
 }
 
 /// Shows diagnostics for people, or as `{"diagnostics": […]}` on the standard output.
