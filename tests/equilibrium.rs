@@ -1,7 +1,6 @@
 //! The compliant mechanism in equilibrium: torque computed two ways, energy over a closed cycle,
 //! independence of the way, derivatives by the design parameters against differences.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
-#![allow(clippy::unwrap_used)]
 
 use flexura::elaborate::{Options, elaborate};
 use flexura::equilibrium::{Cycle, Layout, Model, SensitivityWorkspace, sweep};
@@ -52,8 +51,8 @@ fn torque_is_the_derivative_of_the_energy() {
         (states[s + d].energy_n_mm - states[s - d].energy_n_mm) / (alpha[s + d] - alpha[s - d])
     };
     let (mut largest, mut coarse, mut fine, mut extrapolated) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
-    for s in 2..steps - 1 {
-        let torque = states[s].torque_n_mm(&model, 0);
+    for (s, state) in states.iter().enumerate().take(steps - 1).skip(2) {
+        let torque = state.torque_n_mm(&model, 0);
         let (one, two) = (difference(s, 1), difference(s, 2));
         largest = largest.max(torque.abs());
         coarse = coarse.max((torque - two).abs());
