@@ -178,12 +178,12 @@ fn chebyshev_has_its_drive_goals_and_records() {
     let d = design(run(CHEBYSHEV));
     assert_eq!((d.cycle.steps, d.cycle.duration_s), (60, 2.0));
     let drive = &d.drives[0];
-    assert_eq!(drive.profile, Profile::Range { from_rad: 0.0, to_rad: TAU });
-    assert!((drive.rest_rad - PI / 6.0).abs() < 1e-15);
+    assert_eq!(drive.profile, Profile::Range { from: 0.0, to: TAU });
+    assert!((drive.rest - PI / 6.0).abs() < 1e-15);
     assert_eq!(drive.motor.as_ref().unwrap().stall_n_mm, 400.0);
     let track = ObjectiveKind::Track { trace: 0, scale_mm: Some(0.1) };
     assert_eq!((d.objectives[0].kind.clone(), d.objectives[0].weight), (track, 1.0));
-    let stress = ObjectiveKind::StressBelow { bound_mpa: 25.0, scale_mpa: Some(0.5) };
+    let stress = ObjectiveKind::StressBelow { bound_mpa: 25.0, scale_mpa: Some(0.2) };
     assert_eq!((d.objectives[1].kind.clone(), d.objectives[1].weight), (stress, 1.0));
     let bounds: Vec<_> = d.requirements.iter().map(|r| (r.quantity.clone(), r.at_most, r.bound)).collect();
     assert_eq!(
@@ -204,7 +204,7 @@ fn chebyshev_has_its_drive_goals_and_records() {
 
 #[test]
 fn terms_without_scale_have_the_papers_weights() {
-    let text = CHEBYSHEV.replace(", scale = 0.1 mm", "").replace(", scale = 0.5 MPa", " ");
+    let text = CHEBYSHEV.replace(", scale = 0.1 mm", "").replace(", scale = 0.2 MPa", " ");
     let d = design(run(&text));
     assert_eq!(d.objectives.iter().map(|o| o.weight).collect::<Vec<_>>(), [1e5, 1e-6]);
 }

@@ -42,13 +42,13 @@ fn torque_is_the_derivative_of_the_energy() {
         let p = start(&design);
         let model = Model::new(&design, &layout, &p, EDGES, false).unwrap();
         let states = sweep(&model).unwrap().states;
-        let alpha = &layout.drives[0].values_rad;
+        let alpha = &layout.drives[0].values;
         let mut worst = 0.0f64;
         let mut largest = 0.0f64;
         for s in 1..steps {
             let difference =
                 (states[s + 1].energy_n_mm - states[s - 1].energy_n_mm) / (alpha[s + 1] - alpha[s - 1]);
-            let torque = states[s].torque_n_mm(&model, 0);
+            let torque = states[s].drive_load(&model, 0);
             worst = worst.max((torque - difference).abs());
             largest = largest.max(torque.abs());
         }
@@ -67,7 +67,7 @@ fn a_closed_cycle_takes_no_work() {
     let p = start(&design);
     let model = Model::new(&design, &layout, &p, EDGES, false).unwrap();
     let states = sweep(&model).unwrap().states;
-    let torques: Vec<f64> = states.iter().map(|s| s.torque_n_mm(&model, 0)).collect();
+    let torques: Vec<f64> = states.iter().map(|s| s.drive_load(&model, 0)).collect();
     let size: f64 = torques[..60].iter().map(|t| t.abs()).sum();
     let sum: f64 = torques[..60].iter().sum();
     assert!(sum.abs() < 1e-6 * size, "{sum} of {size}");
@@ -110,7 +110,7 @@ fn states_by_parameters_against_differences() {
     for i in 0..p.len() {
         let shifted = [perturbed(i, -2.0), perturbed(i, -1.0), perturbed(i, 1.0), perturbed(i, 2.0)];
         for (s, state) in states.iter().enumerate() {
-            let target: Vec<f64> = layout.drives.iter().map(|d| d.values_rad[s] - d.rest_rad).collect();
+            let target: Vec<f64> = layout.drives.iter().map(|d| d.values[s] - d.rest).collect();
             let sensitivity = workspace.at(&model, state, &target).unwrap();
             // Five-point differences: error of fourth order in the step.
             let row = model.rows() - 1;
