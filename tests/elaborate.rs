@@ -178,8 +178,8 @@ fn chebyshev_has_its_drive_goals_and_records() {
     let d = design(run(CHEBYSHEV));
     assert_eq!((d.cycle.steps, d.cycle.duration_s), (60, 2.0));
     let drive = &d.drives[0];
-    assert_eq!(drive.profile, Profile::Range { from_rad: 0.0, to_rad: TAU });
-    assert!((drive.rest_rad - PI / 6.0).abs() < 1e-15);
+    assert_eq!(drive.profile, Profile::Range { from: 0.0, to: TAU });
+    assert!((drive.rest - PI / 6.0).abs() < 1e-15);
     assert_eq!(drive.motor.as_ref().unwrap().stall_n_mm, 400.0);
     let track = ObjectiveKind::Track { trace: 0, scale_mm: Some(0.1) };
     assert_eq!((d.objectives[0].kind.clone(), d.objectives[0].weight), (track, 1.0));

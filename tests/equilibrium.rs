@@ -46,13 +46,13 @@ fn torque_is_the_derivative_of_the_energy() {
     let p = start(&design);
     let model = Model::new(&design, &layout, &p, EDGES, false).unwrap();
     let states = sweep(&model).unwrap().states;
-    let alpha = &layout.drives[0].values_rad;
+    let alpha = &layout.drives[0].values;
     let difference = |s: usize, d: usize| {
         (states[s + d].energy_n_mm - states[s - d].energy_n_mm) / (alpha[s + d] - alpha[s - d])
     };
     let (mut largest, mut coarse, mut fine, mut extrapolated) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
     for (s, state) in states.iter().enumerate().take(steps - 1).skip(2) {
-        let torque = state.torque_n_mm(&model, 0);
+        let torque = state.drive_load(&model, 0);
         let (one, two) = (difference(s, 1), difference(s, 2));
         largest = largest.max(torque.abs());
         coarse = coarse.max((torque - two).abs());
@@ -72,7 +72,7 @@ fn a_closed_cycle_takes_no_work() {
     let p = start(&design);
     let model = Model::new(&design, &layout, &p, EDGES, false).unwrap();
     let states = sweep(&model).unwrap().states;
-    let torques: Vec<f64> = states.iter().map(|s| s.torque_n_mm(&model, 0)).collect();
+    let torques: Vec<f64> = states.iter().map(|s| s.drive_load(&model, 0)).collect();
     let size: f64 = torques[..60].iter().map(|t| t.abs()).sum();
     let sum: f64 = torques[..60].iter().sum();
     assert!(sum.abs() < 1e-6 * size, "{sum} of {size}");
@@ -119,7 +119,7 @@ fn states_by_parameters_against_differences() {
             pairs.map(|([right, left], w)| w * (value(right) - value(left))).sum::<f64>() / (60.0 * step(i))
         };
         for (s, state) in states.iter().enumerate() {
-            let target: Vec<f64> = layout.drives.iter().map(|d| d.values_rad[s] - d.rest_rad).collect();
+            let target: Vec<f64> = layout.drives.iter().map(|d| d.values[s] - d.rest).collect();
             let sensitivity = workspace.at(&model, state, &target).unwrap();
             let row = model.rows() - 1;
             let difference_of_torque = difference(&|c| c.states[s].state.lambda[row]);

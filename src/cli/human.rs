@@ -58,9 +58,10 @@ fn measures(text: &mut String, before: Option<&Measures>, after: Option<&Measure
         rows.push((format!("{name}, mean error"), mean(&b), mean(&a), "mm"));
         rows.push((format!("{name}, largest error"), most(&b), most(&a), "mm"));
     }
-    for name in result.drives.keys() {
-        let of = |m: Option<&Measures>| m.and_then(|m| m.drives.get(name)).map(|d| d.max_torque_n_mm);
-        rows.push((format!("{name}, largest torque"), of(before), of(after), "N·mm"));
+    for (name, drive) in &result.drives {
+        let of = |m: Option<&Measures>| m.and_then(|m| m.drives.get(name)).map(|d| d.parts().1);
+        let (what, _, unit) = drive.parts();
+        rows.push((format!("{name}, {what}"), of(before), of(after), unit));
     }
     let stress = |m: Option<&Measures>| m.and_then(|m| m.stress.max_mpa);
     if stress(before).or(stress(after)).is_some() {
@@ -131,7 +132,7 @@ mod tests {
         let trace = TraceMeasures { mean_error_mm: mean, max_error_mm: 2.0 * mean, path_length_mm: 300.0 };
         Measures {
             traces: [("tip".to_string(), trace)].into(),
-            drives: [("motor".to_string(), DriveMeasures { max_torque_n_mm: 41.5 })].into(),
+            drives: [("motor".to_string(), DriveMeasures::Torque { max_torque_n_mm: 41.5 })].into(),
             stress: StressMeasures { max_mpa: Some(24.91) },
             ..Measures::default()
         }

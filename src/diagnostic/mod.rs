@@ -65,6 +65,11 @@ impl Diagnostic {
         Self::new(Severity::Warning, code, message, at)
     }
 
+    /// Advice with `code` at `at`.
+    pub fn advice(code: &str, message: impl Into<String>, at: Origin) -> Self {
+        Self::new(Severity::Advice, code, message, at)
+    }
+
     fn new(severity: Severity, code: &str, message: impl Into<String>, at: Origin) -> Self {
         Self {
             code: code.into(),

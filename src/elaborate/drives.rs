@@ -6,8 +6,8 @@ use super::eval::{Env, Evaluator, Failed, Outcome};
 use super::sheet::{DriveText, Sheet};
 use super::structure::Structure;
 use crate::diagnostic::Diagnostic;
-use crate::ir::{Drive, MotorInterface, Profile};
-use crate::syntax::ast::{self, Expr, ExprKind, Ident};
+use crate::ir::{Drive, DriveUnit, JointKind, MotorInterface};
+use crate::syntax::ast::{Expr, ExprKind, Ident};
 
 impl<'a> Evaluator<'a> {
     pub(super) fn drives(
@@ -53,7 +53,7 @@ impl<'a> Evaluator<'a> {
             };
             match out.iter_mut().find(|d| d.joint == joint) {
                 Some(drive) => match rest {
-                    Ok(v) => drive.rest_rad = v,
+                    Ok(v) => drive.rest = v,
                     Err(Failed) => ok = Err(Failed),
                 },
                 // A drive that is wrong itself has been reported.
@@ -84,7 +84,11 @@ impl<'a> Evaluator<'a> {
                     .help(format!("write a number: `rest {} at 30 deg`", name.node)),
             );
         }
-        let id = self.eval_scalar(&Env::fixed(scope), value, Dimension::ANGLE, "the rest value")?;
+        let dimension = match self.sliders.contains(&name.node) {
+            true => Dimension::LENGTH,
+            false => Dimension::ANGLE,
+        };
+        let id = self.eval_scalar(&Env::fixed(scope), value, dimension, "the rest value")?;
         if self.exprs.as_constant(id).is_none()
             && let Some(at) = self.free_behind(id)
         {
@@ -106,16 +110,13 @@ impl<'a> Evaluator<'a> {
         before: &[Drive],
     ) -> Outcome<Drive> {
         let joint = self.thing(scope, &s.joint_index, text.joint, "joint");
-        let profile = match text.profile {
-            ast::Profile::Range(from, to) => {
-                let a = self.eval_fixed(scope, from, Dimension::ANGLE, "the drive's start");
-                let b = self.eval_fixed(scope, to, Dimension::ANGLE, "the drive's end");
-                a.and_then(|a| Ok((a, b?)))
-            }
-            ast::Profile::Later(at) => self.fail(
-                Diagnostic::error(codes::LATER_STATEMENT, "a drive `by …` is not available yet", *at)
-                    .help("write `drive J from A to B`"),
-            ),
+        let unit = match joint.as_ref().ok().and_then(|j| s.joints.get(*j)) {
+            Some(joint) => self.drive_unit(joint.kind, text.joint),
+            None => Err(Failed),
+        };
+        let profile = match unit {
+            Ok(unit) => self.profile(scope, text.profile, unit),
+            Err(Failed) => Err(Failed),
         };
         let motor = match text.motor {
             None => Ok(None),
@@ -123,7 +124,7 @@ impl<'a> Evaluator<'a> {
                 self.record_named(module, name, "motor").and_then(|item| self.motor(item).map(Some))
             }
         };
-        let (joint, (from_rad, to_rad), motor) = (joint?, profile?, motor?);
+        let (joint, unit, profile, motor) = (joint?, unit?, profile?, motor?);
         if let Some(first) = before.iter().find(|d| d.joint == joint) {
             return self.fail(
                 Diagnostic::error(
@@ -135,19 +136,30 @@ impl<'a> Evaluator<'a> {
                 .also(first.origin, "first here"),
             );
         }
+        if let (DriveUnit::Mm, Some(name)) = (unit, text.motor) {
+            return self.fail(
+                Diagnostic::error(
+                    codes::LATER_STATEMENT,
+                    "a motor for a joint that slides is not available yet",
+                    name.at,
+                )
+                .help("leave out `with …`: the slider is then moved from outside"),
+            );
+        }
         let range = motor.as_ref().and_then(|m| match m.interface {
             MotorInterface::Stepper { .. } => None,
             MotorInterface::Pwm { range_rad } | MotorInterface::Dynamixel { range_rad } => Some(range_rad),
         });
+        let span = super::profiles::span(&profile);
         if let Some(range) = range
             && !text.continuous
-            && (to_rad - from_rad).abs() > range * (1.0 + 1e-9)
+            && span > range * (1.0 + 1e-9)
         {
             return self.fail(
                 Diagnostic::error(codes::MOTOR_RANGE, "the drive goes beyond its motor's range", text.at)
                     .label(format!(
                         "turns {}, the motor {}",
-                        self.show((to_rad - from_rad).abs(), Dimension::ANGLE),
+                        self.show(span, Dimension::ANGLE),
                         self.show(range, Dimension::ANGLE)
                     ))
                     .help("if this motor turns without end, write `continuous` after its name"),
@@ -156,11 +168,28 @@ impl<'a> Evaluator<'a> {
         Ok(Drive {
             name: text.joint.node.clone(),
             joint,
-            profile: Profile::Range { from_rad, to_rad },
-            rest_rad: 0.0,
+            unit,
+            profile,
+            rest: 0.0,
             motor,
             continuous: text.continuous,
             origin: text.at,
         })
+    }
+
+    /// What a drive of a joint of this kind is measured in.
+    fn drive_unit(&mut self, kind: JointKind, name: &Ident) -> Outcome<DriveUnit> {
+        match kind {
+            JointKind::Hinge => Ok(DriveUnit::Rad),
+            JointKind::Slider => Ok(DriveUnit::Mm),
+            _ => self.fail(
+                Diagnostic::error(
+                    codes::NOT_DRIVEN,
+                    format!("a {} joint cannot be driven", kind.name()),
+                    name.at,
+                )
+                .help("hinges and sliders can"),
+            ),
+        }
     }
 }

@@ -40,17 +40,19 @@ pub struct Env {
     pub path: Option<Rc<str>>,
     /// Take the start of a `free` instead of making a variable (to learn a default's dimension).
     pub probe: bool,
+    /// What `t` stands for, where the time of the cycle may stand.
+    pub time: Option<ExprId>,
 }
 
 impl Env {
     /// A place where nothing may vary.
     pub fn fixed(scope: usize) -> Self {
-        Self { scope, path: None, probe: false }
+        Self { scope, path: None, probe: false, time: None }
     }
 
     /// A place whose free values are named `path`.
     pub fn named(scope: usize, path: impl Into<Rc<str>>) -> Self {
-        Self { scope, path: Some(path.into()), probe: false }
+        Self { scope, path: Some(path.into()), probe: false, time: None }
     }
 }
 
@@ -80,6 +82,8 @@ pub struct Evaluator<'a> {
     pub(super) half_said: BTreeSet<String>,
     /// Where each node is: only looked up, never listed.
     interned: HashMap<(u8, u64, u64), ExprId>,
+    /// Names of the joints that slide.
+    pub(super) sliders: BTreeSet<String>,
     /// Values of all nodes at the start values of the free variables, and those start values.
     pub(super) starts: (Vec<f64>, Vec<f64>),
 }
@@ -104,6 +108,7 @@ impl<'a> Evaluator<'a> {
             paths: BTreeSet::new(),
             half_said: BTreeSet::new(),
             interned: HashMap::new(),
+            sliders: BTreeSet::new(),
             starts: (Vec::new(), Vec::new()),
         }
     }
@@ -243,6 +248,12 @@ impl<'a> Evaluator<'a> {
 
     fn name(&mut self, env: &Env, path: &'a [Ident], at: Origin) -> Outcome<Value> {
         let Some((first, rest)) = path.split_first() else { return Err(Failed) };
+        if let Some(id) = env.time
+            && first.node == super::profiles::TIME
+            && rest.is_empty()
+        {
+            return Ok(Value::Scalar(Scalar { id, dim: Dimension::NUMBER }));
+        }
         let mut value = self.lookup(env.scope, first)?;
         let mut so_far = first.node.clone();
         for field in rest {

@@ -6,7 +6,7 @@ use super::eval::{Evaluator, Outcome};
 use super::sheet::Sheet;
 use super::structure::{SAME_POINT_MM, Structure};
 use crate::diagnostic::Diagnostic;
-use crate::ir::{ExprPoint, Layers};
+use crate::ir::{ExprPoint, JointKind, Layers};
 
 /// Height of a link where the text is silent, mm.
 const DEFAULT_HEIGHT_MM: f64 = 12.0;
@@ -105,9 +105,10 @@ impl<'a> Evaluator<'a> {
                 v
             }
         };
-        let axis = s.joints.first().map_or([0.0, 0.0, 1.0], |j| j.axis);
+        let mut hinges = s.joints.iter().filter(|j| j.kind == JointKind::Hinge);
+        let axis = hinges.clone().next().map_or([0.0, 0.0, 1.0], |j| j.axis);
         let used = s.bodies.iter().any(|b| b.layer != 0) || s.joints.iter().any(|j| j.layer != 0);
-        if used && let Some(j) = s.joints.iter().find(|j| dot(j.axis, axis) < 1.0 - 1e-9) {
+        if used && let Some(j) = hinges.find(|j| dot(j.axis, axis) < 1.0 - 1e-9) {
             return self.fail(
                 Diagnostic::error(
                     codes::LATER_TERM,

@@ -199,6 +199,16 @@ impl<'a> Evaluator<'a> {
                 let slots = self.arguments(name, args, &["drive"], 1)?;
                 let drive = self.plain_name(slots.first().copied().flatten(), "drive")?;
                 let index = self.drive_named(scope, drive, drives)?;
+                if self.sliders.contains(&drive.node) {
+                    return self.fail(
+                        Diagnostic::error(
+                            codes::EXPORT,
+                            "code for a drive that slides is not available yet",
+                            drive.at,
+                        )
+                        .help("only turning drives have sketches"),
+                    );
+                }
                 if texts.iter().any(|d| d.joint.node == drive.node && d.motor.is_none()) {
                     return self.fail(
                         Diagnostic::error(

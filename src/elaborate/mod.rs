@@ -18,6 +18,7 @@ mod load;
 mod lookup;
 mod mechanism;
 mod names;
+mod profiles;
 mod records;
 mod require;
 mod scope;

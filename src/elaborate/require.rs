@@ -10,8 +10,8 @@ use crate::syntax::ast::{Argument, Compare, Expr, ExprKind, Ident};
 use std::collections::BTreeMap;
 
 const AGGREGATES: &[&str] = &["max", "min", "mean", "span", "at"];
-const LATER_QUANTITIES: &[&str] = &["force", "tension", "gap", "buckling", "angle"];
-const QUANTITIES: &[&str] = &["error", "stress", "torque"];
+const LATER_QUANTITIES: &[&str] = &["tension", "gap", "buckling", "angle"];
+const QUANTITIES: &[&str] = &["error", "stress", "torque", "force"];
 /// A query as written: `max(error(tip))`.
 struct Query<'a> {
     outer: Option<&'a Ident>,
@@ -133,10 +133,32 @@ impl<'a> Evaluator<'a> {
             "torque" => {
                 let slots = self.arguments(name, args, &["drive"], 1)?;
                 let drive = self.plain_name(slots.first().copied().flatten(), "drive")?;
-                Ok((Quantity::Torque(self.drive_named(scope, drive, drives)?), Dimension::TORQUE))
+                let index = self.drive_named(scope, drive, drives)?;
+                self.slides(drive, false)?;
+                Ok((Quantity::Torque(index), Dimension::TORQUE))
+            }
+            "force" => {
+                let slots = self.arguments(name, args, &["drive"], 1)?;
+                let drive = self.plain_name(slots.first().copied().flatten(), "drive")?;
+                let index = self.drive_named(scope, drive, drives)?;
+                self.slides(drive, true)?;
+                Ok((Quantity::Force(index), Dimension::FORCE))
             }
             later => self.later(codes::LATER_TERM, later, name.at),
         }
+    }
+
+    /// Reports a driven joint that turns where one that slides is meant, or the other way round.
+    fn slides(&mut self, drive: &Ident, wanted: bool) -> Outcome<()> {
+        let name = &drive.node;
+        if self.sliders.contains(name) == wanted {
+            return Ok(());
+        }
+        let (does, right) = if wanted { ("turns", "torque") } else { ("slides", "force") };
+        self.fail(
+            Diagnostic::error(codes::TYPE, format!("`{name}` {does}: its motor has a {right}"), drive.at)
+                .help(format!("write `{right}({name})`")),
+        )
     }
 
     /// The drive of a joint by the joint's name.

@@ -191,7 +191,7 @@ impl<'a> Evaluator<'a> {
         match (ty, default) {
             (Some(ty), _) => self.check_type(&v, value, ty)?,
             (None, Some((scope, default))) => {
-                let probe = Env { scope: *scope, path: None, probe: true };
+                let probe = Env { scope: *scope, path: None, probe: true, time: None };
                 let expected = self.eval(&probe, default)?;
                 self.check_like(&v, value, &expected, default.at)?;
             }

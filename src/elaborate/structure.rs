@@ -13,6 +13,8 @@ use std::collections::BTreeMap;
 
 /// Points nearer than this are one point, mm. Drawn points are exact to about 1e-13 mm.
 pub(super) const SAME_POINT_MM: f64 = 1e-9;
+/// Cosine of the angle between axes that count as square. Drawn axes are exact to 1e-16.
+const SQUARE: f64 = 1e-9;
 /// Farthest layer.
 const MAX_LAYER: f64 = 100.0;
 /// Most bodies, and most joints.
@@ -66,6 +68,9 @@ impl<'a> Evaluator<'a> {
         let planar = self.all_at_z0(scope);
         for (text, at) in &sheet.joints {
             if let Ok(joint) = self.joint(scope, &s, text, *at, planar) {
+                if joint.kind == JointKind::Slider {
+                    self.sliders.insert(joint.name.clone());
+                }
                 s.joint_index.insert(joint.name.clone(), s.joints.len());
                 s.joints.push(joint);
                 s.texts.push(text);
@@ -170,7 +175,7 @@ impl<'a> Evaluator<'a> {
     ) -> Outcome<Joint> {
         let mut bodies = Vec::new();
         self.limit(text.bodies.len() + text.into.len(), "bodies of a joint", at)?;
-        self.joint_kind(&text.kind)?;
+        let kind = self.joint_kind(&text.kind)?;
         let mut ok = Ok(());
         for name in &text.bodies {
             match self.thing(scope, &s.body_index, name, "body") {
@@ -190,27 +195,22 @@ impl<'a> Evaluator<'a> {
             }
         }
         if let Some(third) = text.bodies.get(2) {
-            ok = self.fail(
-                Diagnostic::error(
-                    codes::LATER_JOINT,
-                    "a joint of more than two bodies is not available yet",
-                    third.at,
-                )
-                .help("it is planned for a later version"),
-            );
+            ok = self.many(text, kind, third).and(ok);
         }
         let point = self.eval(&Env::fixed(scope), &text.point).and_then(|v| self.as_point(v, &text.point));
-        let axis = self.axis(scope, text, planar);
+        let axes = self.axes(scope, text, kind, planar);
         let layer = self.layer(scope, text.layer.as_ref());
-        let pin = self.pin(scope, text);
+        let pin = self.pin(scope, text, kind);
         let toward = self.toward(scope, s, text, &bodies);
         ok?;
+        let (axis, second_axis) = axes?;
         Ok(Joint {
             name: text.name.node.clone(),
-            kind: JointKind::Hinge,
+            kind,
             bodies,
             point: point?,
-            axis: axis?,
+            axis,
+            second_axis,
             layer: layer?,
             toward: toward?,
             realization: Realization::Conventional { pin_diameter_mm: pin? },
@@ -218,38 +218,107 @@ impl<'a> Evaluator<'a> {
         })
     }
 
-    fn joint_kind(&mut self, kind: &Ident) -> Outcome<()> {
-        const KINDS: [&str; 6] = ["hinge", "ball", "universal", "slider", "cylindrical", "fixed"];
+    fn joint_kind(&mut self, kind: &Ident) -> Outcome<JointKind> {
         let name = kind.node.as_str();
-        if name == "hinge" {
-            return Ok(());
+        if let Some(found) = JointKind::ALL.into_iter().find(|k| k.name() == name) {
+            return Ok(found);
         }
-        if KINDS.contains(&name) {
-            return self.later(codes::LATER_JOINT, name, kind.at);
-        }
+        let kinds = JointKind::ALL.map(JointKind::name);
         let d =
             Diagnostic::error(codes::UNKNOWN_NAME, format!("there is no kind of joint `{name}`"), kind.at);
-        self.fail(match super::names::suggestion(name, KINDS) {
+        self.fail(match super::names::suggestion(name, kinds) {
             Some(near) => d.help(format!("did you mean `{near}`?")),
-            None => d.help(format!("kinds are {}", KINDS.join(", "))),
+            None => d.help(format!("kinds are {}", kinds.join(", "))),
         })
     }
 
-    fn axis(&mut self, scope: usize, text: &'a ast::Joint, planar: bool) -> Outcome<[f64; 3]> {
-        let Some(e) = &text.axis else {
-            if planar {
-                return Ok([0.0, 0.0, 1.0]);
-            }
+    /// Only a conventional hinge may join more than two bodies.
+    fn many(&mut self, text: &ast::Joint, kind: JointKind, third: &Ident) -> Outcome<()> {
+        if kind != JointKind::Hinge {
+            let message = format!("a {} joint connects two bodies", kind.name());
             return self.fail(
+                Diagnostic::error(codes::JOINT_BODIES, message, third.at)
+                    .help("write one joint for each pair of bodies"),
+            );
+        }
+        if text.template.is_some() {
+            let message = "a flexure between more than two bodies is not available yet";
+            return self.fail(
+                Diagnostic::error(codes::LATER_JOINT, message, third.at)
+                    .help("write one hinge for each pair of bodies, or leave out `as …`"),
+            );
+        }
+        Ok(())
+    }
+
+    /// The axis of a joint, and the second one of a universal joint.
+    fn axes(
+        &mut self,
+        scope: usize,
+        text: &'a ast::Joint,
+        kind: JointKind,
+        planar: bool,
+    ) -> Outcome<([f64; 3], Option<[f64; 3]>)> {
+        let universal = kind == JointKind::Universal;
+        match (&text.axis, &text.second_axis) {
+            (Some(e), _) if matches!(kind, JointKind::Ball | JointKind::Fixed) => self.fail(
+                Diagnostic::error(codes::MISPLACED, format!("a {} joint has no axis", kind.name()), e.at)
+                    .help("leave out `axis …`"),
+            ),
+            (_, Some(e)) if !universal => self.fail(
+                Diagnostic::error(codes::MISPLACED, format!("a {} joint has one axis", kind.name()), e.at)
+                    .help("only a universal joint has two"),
+            ),
+            (first, None) if universal => self.fail(
                 Diagnostic::error(
                     codes::AXIS,
-                    format!("joint `{}` needs an axis", text.name.node),
-                    text.name.at,
+                    format!("universal joint `{}` needs two axes", text.name.node),
+                    first.as_ref().map_or(text.name.at, |e| e.at),
                 )
-                .label("z is meant only where every point lies at z = 0")
-                .help("write `axis z` or `axis (0, 1, 0.25)`"),
+                .label("the first is the first body's, the second the second body's")
+                .help("write `axis y and x`"),
+            ),
+            (_, Some(e)) => {
+                let first = self.axis(scope, text, kind, planar);
+                let (first, second) = (first?, self.direction(scope, e)?);
+                let along = super::frames::dot(first, second);
+                if along.abs() > SQUARE {
+                    return self.fail(
+                        Diagnostic::error(codes::AXIS, "the axes of a universal joint are square", e.at)
+                            .label(format!("this is {:.1} deg from the first", along.acos().to_degrees())),
+                    );
+                }
+                Ok((first, Some(second)))
+            }
+            (None, None) if matches!(kind, JointKind::Ball | JointKind::Fixed) => Ok(([0.0, 0.0, 1.0], None)),
+            _ => Ok((self.axis(scope, text, kind, planar)?, None)),
+        }
+    }
+
+    fn axis(
+        &mut self,
+        scope: usize,
+        text: &'a ast::Joint,
+        kind: JointKind,
+        planar: bool,
+    ) -> Outcome<[f64; 3]> {
+        let Some(e) = &text.axis else {
+            let turns = matches!(kind, JointKind::Hinge | JointKind::Cylindrical);
+            if planar && turns {
+                return Ok([0.0, 0.0, 1.0]);
+            }
+            let d = Diagnostic::error(
+                codes::AXIS,
+                format!("joint `{}` needs an axis", text.name.node),
+                text.name.at,
             );
+            let d = if turns { d.label("z is meant only where every point lies at z = 0") } else { d };
+            return self.fail(d.help("write `axis z` or `axis (0, 1, 0.25)`"));
         };
+        self.direction(scope, e)
+    }
+
+    fn direction(&mut self, scope: usize, e: &'a Expr) -> Outcome<[f64; 3]> {
         if let Some(axis) = named_axis(e) {
             return Ok(axis);
         }
@@ -281,8 +350,14 @@ impl<'a> Evaluator<'a> {
         Ok(d.map(|x| x / length))
     }
 
-    fn pin(&mut self, scope: usize, text: &'a ast::Joint) -> Outcome<Option<f64>> {
+    fn pin(&mut self, scope: usize, text: &'a ast::Joint, kind: JointKind) -> Outcome<Option<f64>> {
         let Some(e) = &text.pin else { return Ok(None) };
+        if kind != JointKind::Hinge {
+            return self.fail(
+                Diagnostic::error(codes::MISPLACED, format!("a {} joint has no pin", kind.name()), e.at)
+                    .help("leave out `pin`"),
+            );
+        }
         if text.template.is_some() {
             return self.fail(
                 Diagnostic::error(codes::MISPLACED, "a compliant joint has no pin", e.at)

@@ -65,6 +65,13 @@ impl<'a> Evaluator<'a> {
         rods: &mut Vec<Rod>,
     ) -> Outcome<Vec<usize>> {
         let (owner, flexure) = self.flexure(scope, module, &text.name)?;
+        if site.kind != "hinge" && flexure.replaces.node == site.kind {
+            let message = format!("a flexure for a {} joint is not available yet", site.kind);
+            return self.fail(
+                Diagnostic::error(codes::LATER_JOINT, message, text.name.at)
+                    .help("leave out `as …`: the joint then stays conventional"),
+            );
+        }
         if flexure.replaces.node != site.kind {
             return self.fail(
                 Diagnostic::error(

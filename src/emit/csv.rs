@@ -1,12 +1,13 @@
 //! `simulate`: one row a state, one column a quantity, the unit in the column's name.
 
+use crate::ir::DriveUnit;
 use std::fmt::Write;
 
 /// A simulated cycle. Optional parts are absent as a whole: a rigid motion has no forces.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionTable {
-    /// Names of the drives, in the order of [`MotionState::drives_rad`].
-    pub drives: Vec<String>,
+    /// Names of the drives with the unit of their values, in the order of [`MotionState::drives`].
+    pub drives: Vec<(String, DriveUnit)>,
     /// Names of the traces, in the order of [`MotionState::traces_mm`].
     pub traces: Vec<String>,
     /// Names of the moving bodies, in the order of [`MotionState::poses`]; empty without `--poses`.
@@ -20,12 +21,12 @@ pub struct MotionTable {
 /// One state of a simulated cycle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionState {
-    /// Drive values relative to the drawing pose, rad.
-    pub drives_rad: Vec<f64>,
+    /// Drive values relative to the drawing pose, rad or mm.
+    pub drives: Vec<f64>,
     /// Traced points, mm.
     pub traces_mm: Vec<[f64; 3]>,
-    /// Torque of each drive on its second body, N·mm.
-    pub torques_n_mm: Vec<f64>,
+    /// Torque of each drive on its second body, N·mm; of a sliding one the force, N.
+    pub drive_loads: Vec<f64>,
     /// Elastic energy, N·mm.
     pub energy_n_mm: f64,
     /// Largest von Mises stress over all rods, MPa.
@@ -59,12 +60,18 @@ pub fn write_csv(table: &MotionTable) -> String {
 /// Names of the columns, with their units. The first is `step`.
 pub fn columns(table: &MotionTable) -> Vec<String> {
     let mut out = vec!["step".to_string()];
-    out.extend(table.drives.iter().map(|drive| format!("drive.{drive}_deg")));
+    out.extend(table.drives.iter().map(|(drive, unit)| match unit {
+        DriveUnit::Rad => format!("drive.{drive}_deg"),
+        DriveUnit::Mm => format!("drive.{drive}_mm"),
+    }));
     for trace in &table.traces {
         out.extend(["x", "y", "z"].map(|axis| format!("trace.{trace}.{axis}_mm")));
     }
     if table.has_forces {
-        out.extend(table.drives.iter().map(|drive| format!("torque.{drive}_n_mm")));
+        out.extend(table.drives.iter().map(|(drive, unit)| match unit {
+            DriveUnit::Rad => format!("torque.{drive}_n_mm"),
+            DriveUnit::Mm => format!("force.{drive}_n"),
+        }));
         out.extend(["energy_n_mm", "stress_max_mpa"].map(String::from));
     }
     for body in &table.bodies {
@@ -80,12 +87,15 @@ pub fn values(table: &MotionTable, step: usize) -> Vec<Option<f64>> {
     let state = table.states.get(step).unwrap_or(&nothing);
     let mut row = vec![step as f64];
     let at = |values: &[f64], i: usize| values.get(i).copied().unwrap_or(f64::NAN);
-    row.extend((0..table.drives.len()).map(|i| degrees(at(&state.drives_rad, i))));
+    row.extend(table.drives.iter().enumerate().map(|(i, (_, unit))| match unit {
+        DriveUnit::Rad => degrees(at(&state.drives, i)),
+        DriveUnit::Mm => at(&state.drives, i),
+    }));
     for i in 0..table.traces.len() {
         row.extend(state.traces_mm.get(i).copied().unwrap_or([f64::NAN; 3]));
     }
     if table.has_forces {
-        row.extend((0..table.drives.len()).map(|i| at(&state.torques_n_mm, i)));
+        row.extend((0..table.drives.len()).map(|i| at(&state.drive_loads, i)));
         row.extend([state.energy_n_mm, state.stress_max_mpa]);
     }
     for i in 0..table.bodies.len() {
@@ -122,14 +132,14 @@ mod tests {
 
     fn table() -> MotionTable {
         MotionTable {
-            drives: vec!["motor".into()],
+            drives: vec![("motor".into(), DriveUnit::Rad)],
             traces: vec!["tip".into()],
             bodies: vec!["coupler".into()],
             has_forces: true,
             states: vec![MotionState {
-                drives_rad: vec![30_f64.to_radians()],
+                drives: vec![30_f64.to_radians()],
                 traces_mm: vec![[1.5, -0.0, 0.1]],
-                torques_n_mm: vec![-2.25],
+                drive_loads: vec![-2.25],
                 energy_n_mm: 3.0,
                 stress_max_mpa: 1e-9,
                 poses: vec![([1.0, 2.0, 3.0], [0.1, 0.2, f64::NAN])],
@@ -151,6 +161,16 @@ mod tests {
         );
         assert_eq!(lines.next(), Some("0,30.0,1.5,0.0,0.1,-2.25,3.0,1e-9,1.0,2.0,3.0,0.1,0.2,"));
         assert_eq!(lines.next(), None);
+    }
+
+    #[test]
+    fn a_sliding_drive_has_millimetres_and_newtons() {
+        let sliding =
+            MotionTable { drives: vec![("pull".into(), DriveUnit::Mm)], bodies: Vec::new(), ..table() };
+        let names = columns(&sliding);
+        assert_eq!((names[1].as_str(), names[5].as_str()), ("drive.pull_mm", "force.pull_n"));
+        assert_eq!(values(&sliding, 0)[1], Some(30_f64.to_radians()));
+        assert_eq!(values(&sliding, 0)[5], Some(-2.25));
     }
 
     #[test]

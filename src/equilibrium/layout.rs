@@ -2,7 +2,7 @@
 //! frames of the rods, constraints, drives, traces and their targets, all in rest world coordinates.
 
 use crate::ir::{BodyId, Design};
-use crate::kinematics::{Constraint, HingeAngle, Motion};
+use crate::kinematics::{Constraint, JointValue, Motion};
 use crate::math::Pose;
 use nalgebra::{Matrix3, Vector3};
 
@@ -29,12 +29,12 @@ pub struct LayoutBody {
 /// A drive row of the compliant model.
 #[derive(Clone, Debug)]
 pub struct LayoutDrive {
-    /// Relative angle, zero in the rest pose.
-    pub angle: HingeAngle,
-    /// Drive value of the rest pose, rad.
-    pub rest_rad: f64,
-    /// Drive value per state 0..=N, rad.
-    pub values_rad: Vec<f64>,
+    /// Relative angle or way, zero in the rest pose.
+    pub joint: JointValue,
+    /// Drive value of the rest pose, rad or mm.
+    pub rest: f64,
+    /// Drive value per state 0..=N, rad or mm.
+    pub values: Vec<f64>,
 }
 
 /// A traced point.
@@ -55,7 +55,7 @@ pub struct Layout {
     pub bodies: Vec<LayoutBody>,
     /// Frames of both ends of each rod.
     pub rod_ends: Vec<[RodEndFrame; 2]>,
-    /// Constraints of the conventional joints.
+    /// Constraints of the conventional joints, and gauges of what they leave idle.
     pub constraints: Vec<Constraint>,
     /// Drives.
     pub drives: Vec<LayoutDrive>,
@@ -101,25 +101,31 @@ impl Layout {
             if joint.is_compliant() {
                 continue;
             }
-            for pair in joint.bodies.windows(2) {
-                let (a, b) = (pair[0], pair[1]);
+            for [a, b] in joint.pairs() {
                 let axis = rest[a].direction(&Vector3::from(joint.axis));
-                constraints.extend(Constraint::hinge(a, b, at_rest(a, drawn), &axis));
+                let second = joint.second_axis.map(|s| rest[b].direction(&Vector3::from(s)));
+                let point = at_rest(a, drawn);
+                constraints.extend(Constraint::of_joint(joint.kind, [a, b], point, &axis, second.as_ref()));
             }
+        }
+        for idle in motion.mobility.idle.iter().filter(|i| i.is_conventional(design)) {
+            constraints.push(idle.gauge(rest[idle.body].direction(&idle.axis)));
         }
 
         let drives = design
             .drives
             .iter()
-            .map(|d| {
+            .filter_map(|d| {
                 let joint = &design.joints[d.joint];
-                let axis = rest[joint.bodies[0]].direction(&Vector3::from(joint.axis));
+                let pair = joint.pairs().next()?;
+                let axis = rest[pair[0]].direction(&Vector3::from(joint.axis));
+                let point = at_rest(pair[0], &joint_points[d.joint]);
                 let steps = design.cycle.steps;
-                LayoutDrive {
-                    angle: HingeAngle::new(joint.bodies[0], joint.bodies[1], &axis),
-                    rest_rad: d.rest_rad,
-                    values_rad: (0..=steps).map(|s| d.profile.value_rad(s as f64 / steps as f64)).collect(),
-                }
+                Some(LayoutDrive {
+                    joint: JointValue::new(joint.kind, pair, point, &axis)?,
+                    rest: d.rest,
+                    values: (0..=steps).map(|s| d.value(s as f64 / steps as f64)).collect(),
+                })
             })
             .collect();
 
@@ -173,7 +179,7 @@ impl Layout {
         }
         let length_mm = (arms.0 / f64::from(arms.1.max(1))).max(1.0);
 
-        let closed = design.drives.iter().all(|d| d.profile.is_closed());
+        let closed = design.drives.iter().all(|d| d.is_closed());
         let rest_poses = rest.clone();
         Self { bodies, rod_ends, constraints, drives, traces, closed, rest_poses, length_mm }
     }
@@ -185,7 +191,7 @@ impl Layout {
 
     /// Number of states 0..=N.
     pub fn states(&self) -> usize {
-        self.drives.iter().map(|d| d.values_rad.len()).max().unwrap_or(1)
+        self.drives.iter().map(|d| d.values.len()).max().unwrap_or(1)
     }
 
     /// Number of states that count in sums: a closed cycle's last state is its first.

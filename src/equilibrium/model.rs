@@ -43,10 +43,10 @@ pub struct State {
     pub poses: Vec<Pose>,
     /// Centreline and frames of each rod.
     pub rods: Vec<RodState>,
-    /// Multipliers: constraint rows in order, then drives (N, N·mm, N·mm per rad).
+    /// Multipliers: constraint rows in order, then drives (N, N·mm, N·mm per rad; of a sliding drive N).
     pub lambda: Vec<f64>,
-    /// Drive angle relative to rest, unwrapped, rad.
-    pub drives_rad: Vec<f64>,
+    /// Drive values relative to rest, unwrapped, rad or mm.
+    pub drives: Vec<f64>,
 }
 
 impl<'l> Model<'l> {
@@ -107,7 +107,7 @@ impl<'l> Model<'l> {
             poses: self.layout.bodies.iter().map(|b| Pose::rest(b.center)).collect(),
             rods: self.rods.iter().map(|r| r.rod.rest_state()).collect(),
             lambda: vec![0.0; self.rows()],
-            drives_rad: vec![0.0; self.layout.drives.len()],
+            drives: vec![0.0; self.layout.drives.len()],
         }
     }
 

@@ -2,6 +2,7 @@
 //! saddle-point system for links and multipliers, full steps first.
 
 use super::model::{Model, State};
+use crate::ir::DriveUnit;
 use crate::kinematics::{Constraint, Jacobian};
 use crate::math::Ldlt;
 use crate::rod::{RodSystem, StationStrain};
@@ -48,8 +49,8 @@ pub struct Equilibrium {
 }
 
 impl Equilibrium {
-    /// Torque the motor exerts on the drive's second body, N·mm: τ = dΠ/dα = −λ.
-    pub fn torque_n_mm(&self, model: &Model, drive: usize) -> f64 {
+    /// Torque the motor exerts on the drive's second body, N·mm (of a sliding drive the force, N): τ = dΠ/dα = −λ.
+    pub fn drive_load(&self, model: &Model, drive: usize) -> f64 {
         -self.state.lambda[model.rows() - model.layout.drives.len() + drive]
     }
 }
@@ -105,8 +106,11 @@ impl Solver {
                 row += 1;
             }
         }
-        for _ in &model.layout.drives {
-            scale[row] = lever;
+        for drive in &model.layout.drives {
+            scale[row] = match drive.joint.unit() {
+                DriveUnit::Rad => lever,
+                DriveUnit::Mm => 1.0,
+            };
             row += 1;
         }
         Self {
@@ -118,7 +122,7 @@ impl Solver {
         }
     }
 
-    /// Solves for equilibrium at the drive values `target` (relative to rest, rad), from `state`.
+    /// Solves for equilibrium at the drive values `target` (relative to rest, rad or mm), from `state`.
     /// On success the factors of the solved state are kept for tangents and sensitivities.
     ///
     /// # Errors
@@ -200,11 +204,11 @@ impl Solver {
             }
         }
         for (i, drive) in model.layout.drives.iter().enumerate() {
-            let value = drive.angle.value(&state.poses, state.drives_rad[i]);
-            let gradient = drive.angle.gradient(&state.poses);
+            let value = drive.joint.value(&state.poses, state.drives[i]);
+            let gradient = drive.joint.gradient(&state.poses);
             f(
                 row,
-                [drive.angle.a, drive.angle.b],
+                drive.joint.bodies(),
                 state.lambda[row],
                 value - target[i],
                 self.scale[n + row],
@@ -235,10 +239,10 @@ impl Solver {
             row += c.rows();
         }
         for (i, drive) in model.layout.drives.iter().enumerate() {
-            let h = drive.angle.hessian(&state.poses) * state.lambda[row + i];
-            scatter_matrix(model, [drive.angle.a, drive.angle.b], &h, &mut k);
+            let h = drive.joint.hessian(&state.poses) * state.lambda[row + i];
+            scatter_matrix(model, drive.joint.bodies(), &h, &mut k);
         }
-        let target: Vec<f64> = state.drives_rad.clone();
+        let target: Vec<f64> = state.drives.clone();
         self.for_each_row(model, state, &target, |row, bodies, _, _, _, gradient| {
             for (half, body) in bodies.into_iter().enumerate() {
                 if let Some(first) = model.layout.bodies[body].first_dof {
@@ -347,8 +351,8 @@ impl Solver {
                 for (l, d) in next.lambda.iter_mut().zip(step.rows(n, model.rows()).iter()) {
                     *l += fraction * d;
                 }
-                for (value, drive) in next.drives_rad.iter_mut().zip(&model.layout.drives) {
-                    *value = drive.angle.value(&next.poses, *value);
+                for (value, drive) in next.drives.iter_mut().zip(&model.layout.drives) {
+                    *value = drive.joint.value(&next.poses, *value);
                 }
                 *state = next;
                 return Ok(());

@@ -20,8 +20,8 @@ pub struct Cycle {
 pub struct SweepError {
     /// The state that could not be reached.
     pub state: usize,
-    /// Drive values of the last equilibrium before it, relative to the drawing pose, rad.
-    pub last_drives_rad: Vec<f64>,
+    /// Drive values of the last equilibrium before it, relative to the drawing pose, rad or mm.
+    pub last_drives: Vec<f64>,
     /// What went wrong there.
     pub error: SolveError,
 }
@@ -33,7 +33,7 @@ pub struct SweepError {
 pub fn sweep(model: &Model) -> Result<Cycle, SweepError> {
     let count = model.layout.states();
     let target =
-        |s: usize| -> Vec<f64> { model.layout.drives.iter().map(|d| d.values_rad[s] - d.rest_rad).collect() };
+        |s: usize| -> Vec<f64> { model.layout.drives.iter().map(|d| d.values[s] - d.rest).collect() };
     let distance = |s: usize| target(s).iter().map(|v| v * v).sum::<f64>();
     let nearest = (0..count).min_by(|a, b| distance(*a).total_cmp(&distance(*b))).unwrap_or(0);
 
@@ -64,21 +64,21 @@ pub fn sweep(model: &Model) -> Result<Cycle, SweepError> {
 #[derive(Clone)]
 struct Walker {
     equilibrium: Equilibrium,
-    drives_rad: Vec<f64>,
+    drives: Vec<f64>,
 }
 
 impl Walker {
     fn at_rest(model: &Model, solver: &mut Solver) -> Result<Self, SweepError> {
-        let drives_rad = vec![0.0; model.layout.drives.len()];
+        let drives = vec![0.0; model.layout.drives.len()];
         let equilibrium = solver
-            .solve(model, model.rest_state(), &drives_rad)
-            .map_err(|error| Self::lost(model, &drives_rad, 0, error))?;
-        Ok(Self { equilibrium, drives_rad })
+            .solve(model, model.rest_state(), &drives)
+            .map_err(|error| Self::lost(model, &drives, 0, error))?;
+        Ok(Self { equilibrium, drives })
     }
 
     fn lost(model: &Model, drives: &[f64], state: usize, error: SolveError) -> SweepError {
-        let last_drives_rad = drives.iter().zip(&model.layout.drives).map(|(v, d)| v + d.rest_rad).collect();
-        SweepError { state, last_drives_rad, error }
+        let last_drives = drives.iter().zip(&model.layout.drives).map(|(v, d)| v + d.rest).collect();
+        SweepError { state, last_drives, error }
     }
 
     /// Goes to `target`, in one step where that works.
@@ -92,19 +92,19 @@ impl Walker {
         let mut part = 1.0;
         let mut fresh = true;
         loop {
-            let change: Vec<f64> = target.iter().zip(&self.drives_rad).map(|(t, d)| t - d).collect();
+            let change: Vec<f64> = target.iter().zip(&self.drives).map(|(t, d)| t - d).collect();
             if change.iter().all(|c| c.abs() < 1e-15) {
                 return Ok(());
             }
             let next: Vec<f64> = if part >= 1.0 {
                 target.to_vec()
             } else {
-                self.drives_rad.iter().zip(&change).map(|(d, c)| d + part * c).collect()
+                self.drives.iter().zip(&change).map(|(d, c)| d + part * c).collect()
             };
             match self.try_step(model, solver, &next, fresh) {
                 Ok(equilibrium) => {
                     self.equilibrium = equilibrium;
-                    self.drives_rad = next;
+                    self.drives = next;
                     fresh = false;
                     if part >= 1.0 {
                         return Ok(());
@@ -116,7 +116,7 @@ impl Walker {
                     part *= 0.5;
                     fresh = true;
                     if part < LEAST_PART {
-                        return Err(Self::lost(model, &self.drives_rad, state, error));
+                        return Err(Self::lost(model, &self.drives, state, error));
                     }
                 }
             }
@@ -134,10 +134,10 @@ impl Walker {
     ) -> Result<Equilibrium, SolveError> {
         let mut state: State = self.equilibrium.state.clone();
         if fresh {
-            state = solver.solve(model, state, &self.drives_rad)?.state;
+            state = solver.solve(model, state, &self.drives)?.state;
         }
         let mut tangent = DVector::zeros(model.layout.dofs() + model.rows());
-        for (i, (to, from)) in next.iter().zip(&self.drives_rad).enumerate() {
+        for (i, (to, from)) in next.iter().zip(&self.drives).enumerate() {
             tangent += solver.drive_tangent(model, i) * (to - from);
         }
         solver.advance(model, &mut state, &tangent, 1.0)?;

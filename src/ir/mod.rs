@@ -1,10 +1,12 @@
 //! The narrow waist: a [`Design`] is all that elaboration hands to the numerical stages, and a
 //! [`Solution`] all that they hand back. Plain data; units are mm, N, MPa, rad, s throughout.
 
+mod drive;
 pub mod expr;
 mod solution;
 
 pub use crate::diagnostic::Origin;
+pub use drive::{Drive, DriveUnit, Profile};
 use expr::{ExprGraph, ExprId};
 use serde::{Deserialize, Serialize};
 pub use solution::Solution;
@@ -112,6 +114,24 @@ pub enum JointKind {
     Fixed,
 }
 
+impl JointKind {
+    /// All kinds.
+    pub const ALL: [Self; 6] =
+        [Self::Hinge, Self::Ball, Self::Universal, Self::Slider, Self::Cylindrical, Self::Fixed];
+
+    /// Its keyword.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hinge => "hinge",
+            Self::Ball => "ball",
+            Self::Universal => "universal",
+            Self::Slider => "slider",
+            Self::Cylindrical => "cylindrical",
+            Self::Fixed => "fixed",
+        }
+    }
+}
+
 /// A joint of two or more bodies at one point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Joint {
@@ -119,13 +139,17 @@ pub struct Joint {
     pub name: String,
     /// Kind.
     pub kind: JointKind,
-    /// Bodies in the order written; the joint's value is the second relative to the first.
+    /// Bodies in the order written; the joint's value is the second relative to the first. A conventional joint of
+    /// more than two bodies joins every later one to the first.
     pub bodies: Vec<BodyId>,
     /// Position in the drawing pose, without the layer's offset.
     pub point: ExprPoint,
     /// Unit axis in the drawing pose.
     pub axis: [f64; 3],
-    /// Layer the joint lies in: its physical point is `point + layer * pitch * axis`.
+    /// Second unit axis of a universal joint, carried by the second body (the first by the first).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub second_axis: Option<[f64; 3]>,
+    /// Layer the joint lies in: its physical point is `point + layer * pitch * stacking axis`.
     pub layer: i32,
     /// `into BODY toward Q`: overrides e1 of that body's end frame. Points in the drawing pose.
     pub toward: Vec<(BodyId, ExprPoint)>,
@@ -139,6 +163,12 @@ impl Joint {
     /// Whether flexures replace the conventional joint.
     pub fn is_compliant(&self) -> bool {
         matches!(self.realization, Realization::Compliant { .. })
+    }
+
+    /// The two-body joints it is made of when conventional: the first body with every later one.
+    pub fn pairs(&self) -> impl Iterator<Item = [BodyId; 2]> {
+        let first = self.bodies.first().copied();
+        self.bodies.iter().skip(1).filter_map(move |b| Some([first?, *b]))
     }
 }
 
@@ -201,53 +231,6 @@ pub enum Section {
         /// Half the width.
         b: ExprId,
     },
-}
-
-/// A driven joint.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Drive {
-    /// Name: the joint's.
-    pub name: String,
-    /// The driven joint.
-    pub joint: JointId,
-    /// Value over the cycle, relative to the drawing pose, rad.
-    pub profile: Profile,
-    /// Value in the rest pose, rad.
-    pub rest_rad: f64,
-    /// Motor, if stated.
-    pub motor: Option<Motor>,
-    /// The motor turns continuously.
-    pub continuous: bool,
-    /// Declaration.
-    pub origin: Origin,
-}
-
-/// A drive's value over the cycle.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Profile {
-    /// Linear from the first to the second.
-    Range {
-        /// At t = 0, rad.
-        from_rad: f64,
-        /// At t = 1, rad.
-        to_rad: f64,
-    },
-}
-
-impl Profile {
-    /// Value at t in 0..1, rad.
-    pub fn value_rad(&self, t: f64) -> f64 {
-        match *self {
-            Profile::Range { from_rad, to_rad } => from_rad + (to_rad - from_rad) * t,
-        }
-    }
-
-    /// Whether the mechanism is in the same pose at t = 0 and t = 1.
-    pub fn is_closed(&self) -> bool {
-        let turns = (self.value_rad(1.0) - self.value_rad(0.0)) / std::f64::consts::TAU;
-        (turns - turns.round()).abs() < 1e-9
-    }
 }
 
 /// Steps and duration: states 0..=steps at t = state / steps.
@@ -350,6 +333,8 @@ pub enum Quantity {
     Stress,
     /// Size of the drive's torque, N·mm. Index into [`Design::drives`].
     Torque(usize),
+    /// Size of a slider drive's force, N. Index into [`Design::drives`].
+    Force(usize),
 }
 
 /// Material data; what the text does not state is absent.

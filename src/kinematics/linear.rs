@@ -1,10 +1,11 @@
 //! Linearised constraints of a mechanism: scaled sparse rows, their normal equations, and rank by singular values.
 //!
-//! Rows are constraint residuals (lengths divided by L) and, last, drive rows φ − α. Redundant rows (every planar
+//! Rows are constraint residuals (lengths divided by L) and, last, drive rows φ − α (ways divided by L). Gauges of idle
+//! freedoms stand apart: they make the normal matrix regular and are counted nowhere. Redundant rows (every planar
 //! loop in space has some) are no obstacle: the normal matrix JᵀJ has full rank whenever the motion is determined.
 //! Squaring the condition only costs Newton's method accuracy per step, not accuracy of the result.
 
-use super::constraint::Jacobian;
+use super::constraint::{Constraint, Jacobian};
 use super::mechanism::Mechanism;
 use crate::math::Pose;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
@@ -28,6 +29,7 @@ struct Row {
 #[derive(Clone, Debug)]
 pub(super) struct Rows {
     rows: Vec<Row>,
+    gauges: Vec<Row>,
     /// Scaled residuals: constraints, then drives.
     pub residual: Vec<f64>,
     drives: usize,
@@ -35,13 +37,13 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// Linearises at `poses` with the drives held at `drive` (rad).
+    /// Linearises at `poses` with the drives held at `drive` (rad or mm).
     pub fn at(mechanism: &Mechanism, poses: &[Pose], drive: &[f64]) -> Self {
         let scale = mechanism.length;
         let mut rows = Vec::with_capacity(5 * mechanism.constraints.len() / 2 + drive.len());
         let mut residual = Vec::with_capacity(rows.capacity());
         let mut jacobian = Jacobian::default();
-        let mut values = [0.0; 3];
+        let mut values = [0.0; Constraint::MAX_ROWS];
         for (constraint, _) in &mechanism.constraints {
             constraint.residual(poses, &mut values);
             constraint.jacobian(poses, &mut jacobian);
@@ -55,16 +57,22 @@ impl Rows {
                 residual.push(value / unit);
             }
         }
-        for (driven, value) in mechanism.design.drives.iter().zip(drive) {
-            let angle = &mechanism.angles[driven.joint];
-            let g = angle.gradient(poses);
+        for (driven, value) in mechanism.drives.iter().zip(drive) {
+            let unit = mechanism.drive_scale(driven);
+            let g = driven.gradient(poses);
             let entry =
-                |first: usize| std::array::from_fn(|k| g[first + k] * if k < 3 { scale } else { 1.0 });
-            let column = [angle.a, angle.b].map(|b| mechanism.column[b]);
+                |first: usize| std::array::from_fn(|k| g[first + k] * if k < 3 { scale } else { 1.0 } / unit);
+            let column = driven.bodies().map(|b| mechanism.column[b]);
             rows.push(Row { column, entries: [entry(0), entry(6)] });
-            residual.push(angle.value(poses, *value) - value);
+            residual.push((driven.value(poses, *value) - value) / unit);
         }
-        Self { rows, residual, drives: drive.len(), unknowns: mechanism.unknowns() }
+        let mut gauges = Vec::with_capacity(mechanism.idle.len());
+        for idle in &mechanism.idle {
+            let turn = poses[idle.body].direction(&idle.axis);
+            let entry = std::array::from_fn(|k| if k < 3 { 0.0 } else { turn[k - 3] });
+            gauges.push(Row { column: [mechanism.column[idle.body], None], entries: [entry, [0.0; 6]] });
+        }
+        Self { rows, gauges, residual, drives: drive.len(), unknowns: mechanism.unknowns() }
     }
 
     /// Largest residual.
@@ -94,7 +102,8 @@ impl Rows {
     /// JᵀK for the rows K of another pose.
     pub fn product(&self, other: &Self) -> DMatrix<f64> {
         let mut out = DMatrix::zeros(self.unknowns, self.unknowns);
-        for (row, col) in self.rows.iter().zip(&other.rows) {
+        let gauges = self.gauges.iter().zip(&other.gauges);
+        for (row, col) in self.rows.iter().zip(&other.rows).chain(gauges) {
             for (i, left) in row.blocks() {
                 for (j, right) in col.blocks() {
                     for (c, right) in right.iter().enumerate() {
@@ -122,12 +131,21 @@ impl Rows {
         Some(Factor { cholesky, least_pivot: least })
     }
 
-    /// Rank and null space of all rows, or without the drives' rows.
+    /// Products of all rows with scaled motions.
+    pub fn times(&self, motions: &[DVector<f64>]) -> DMatrix<f64> {
+        DMatrix::from_fn(self.rows.len(), motions.len(), |i, j| {
+            let blocks = self.rows[i].blocks();
+            blocks.map(|(first, b)| (0..6).map(|k| b[k] * motions[j][first + k]).sum::<f64>()).sum()
+        })
+    }
+
+    /// Rank and null space of all rows, or without the drives' rows. Idle freedoms count as held.
     pub fn rank(&self, with_drives: bool) -> Rank {
         let count = self.rows.len() - if with_drives { 0 } else { self.drives };
         // Zero rows make the matrix tall, so that the decomposition has all right singular vectors.
-        let mut dense = DMatrix::zeros(count.max(self.unknowns), self.unknowns);
-        for (i, row) in self.rows.iter().take(count).enumerate() {
+        let all = count + self.gauges.len();
+        let mut dense = DMatrix::zeros(all.max(self.unknowns), self.unknowns);
+        for (i, row) in self.rows.iter().take(count).chain(&self.gauges).enumerate() {
             for (j, block) in row.blocks() {
                 for (k, x) in block.iter().enumerate() {
                     dense[(i, j + k)] += x;
@@ -141,7 +159,7 @@ impl Rows {
             Some(v_t) => zero.iter().map(|i| v_t.row(*i).transpose()).collect(),
             None => Vec::new(),
         };
-        Rank { rows: count, rank: self.unknowns - zero.len(), null }
+        Rank { rows: count, rank: self.unknowns - zero.len() - self.gauges.len(), null }
     }
 }
 

@@ -1,15 +1,20 @@
-//! The conventional mechanism of a design at given values of its free variables: bodies, hinges, drives and traces
+//! The conventional mechanism of a design at given values of its free variables: bodies, joints, drives and traces
 //! in drawing coordinates. Compliant joints count as the conventional joint they replace.
 
-use super::constraint::{Constraint, HingeAngle};
+use super::constraint::Constraint;
+use super::idle::{self, Idle};
+use super::value::JointValue;
 use crate::diagnostic::Diagnostic;
-use crate::ir::{Design, Drive, JointId, JointKind};
+use crate::ir::{Design, Drive, DriveUnit, JointId, JointKind};
 use crate::math::Pose;
 use nalgebra::Vector3;
 
 /// Sizes beyond which a file is taken for a mistake.
 const MAX_MOVING_BODIES: usize = 100;
 const MAX_DRIVE_RAD: f64 = 100.0 * std::f64::consts::TAU;
+/// More steps of a cycle than elaboration allows.
+const MAX_STEPS: usize = 1_000_000;
+const MAX_DRIVE_MM: f64 = 10_000.0;
 /// Bound of (states + steps of 0.2 rad) · (moving bodies)³. Jansen's leg has 3e4 and takes 6 ms, a driven chain of a
 /// hundred links 6e7 and 30 s.
 const MAX_WORK: f64 = 1e8;
@@ -23,9 +28,13 @@ pub struct Mechanism<'d> {
     pub drawing: Vec<Pose>,
     /// Constraints with the joint each comes from.
     pub constraints: Vec<(Constraint, JointId)>,
-    /// Angle of every joint, by [`JointId`].
-    pub angles: Vec<HingeAngle>,
-    /// Physical point of every joint as drawn: with its layer's offset along the axis, mm.
+    /// Value of every joint that has one, by [`JointId`].
+    pub values: Vec<Option<JointValue>>,
+    /// Value of every drive's joint.
+    pub drives: Vec<JointValue>,
+    /// Idle freedoms.
+    pub idle: Vec<Idle>,
+    /// Physical point of every joint as drawn: with its layer's offset along the stacking axis, mm.
     pub joint_points: Vec<Vector3<f64>>,
     /// Body and point as drawn of every trace, mm.
     pub traces: Vec<(usize, Vector3<f64>)>,
@@ -39,8 +48,8 @@ impl<'d> Mechanism<'d> {
     /// Builds the mechanism at the free variables `p`.
     ///
     /// # Errors
-    /// Joints of kinds that cannot be solved yet, geometry that is not finite at `p`, or a design whose indices do
-    /// not fit together.
+    /// Geometry that is not finite at `p`, drives of joints that have no value, or a design whose indices do not fit
+    /// together.
     pub fn new(design: &'d Design, p: &[f64]) -> Result<Self, Vec<Diagnostic>> {
         consistent(design, p)?;
         let values = design.exprs.values(p);
@@ -51,38 +60,37 @@ impl<'d> Mechanism<'d> {
         };
         let mut errors = Vec::new();
         let mut constraints = Vec::new();
-        let mut angles = Vec::new();
+        let mut joint_values = Vec::new();
         let mut joint_points = Vec::new();
         for (id, joint) in design.joints.iter().enumerate() {
             let axis = Vector3::from(joint.axis);
-            let at = point(&joint.point) + axis * (f64::from(joint.layer) * design.layers.pitch_mm);
+            let stacking = match joint.kind {
+                JointKind::Hinge => axis,
+                _ => Vector3::from(design.layers.axis),
+            };
+            let at = point(&joint.point) + stacking * (f64::from(joint.layer) * design.layers.pitch_mm);
             let finite = at.iter().chain(&axis).all(|x| x.is_finite()) && axis.norm() > 0.5;
             if !finite {
                 errors.push(not_finite("joint", &joint.name, joint.origin));
             }
-            match (joint.kind, joint.bodies.as_slice()) {
-                (JointKind::Hinge, &[a, b]) => {
-                    constraints.extend(Constraint::hinge(a, b, at, &axis).map(|c| (c, id)));
-                    angles.push(HingeAngle::new(a, b, &axis));
-                }
-                (JointKind::Hinge, bodies) => errors.push(
-                    Diagnostic::error(
-                        "E0901",
-                        format!("a hinge of {} bodies is not available yet", bodies.len()),
-                        joint.origin,
-                    )
-                    .help("write one hinge for each pair of bodies, at the same point"),
-                ),
-                (kind, _) => errors.push(
-                    Diagnostic::error(
-                        "E0901",
-                        format!("the motion of a {} joint is not available yet", kind_name(kind)),
-                        joint.origin,
-                    )
-                    .help("use hinges only"),
+            let second = joint.second_axis.map(Vector3::from);
+            for pair in joint.pairs() {
+                let made = Constraint::of_joint(joint.kind, pair, at, &axis, second.as_ref());
+                constraints.extend(made.into_iter().map(|c| (c, id)));
+            }
+            let first_pair = joint.pairs().next();
+            joint_values.push(first_pair.and_then(|pair| JointValue::new(joint.kind, pair, at, &axis)));
+            joint_points.push(at);
+        }
+        let mut drives = Vec::new();
+        for drive in &design.drives {
+            match joint_values.get(drive.joint).copied().flatten() {
+                Some(value) if value.unit() == drive.unit => drives.push(value),
+                _ => errors.push(
+                    Diagnostic::error("E0500", format!("`{}` cannot be driven so", drive.name), drive.origin)
+                        .help("a drive turns a hinge (deg) or moves a slider (mm)"),
                 ),
             }
-            joint_points.push(at);
         }
         let mut traces = Vec::new();
         for trace in &design.traces {
@@ -102,7 +110,20 @@ impl<'d> Mechanism<'d> {
             next += if body.ground { 0 } else { 6 };
         }
         let (drawing, length) = centers(design, &joint_points, &traces);
-        Ok(Self { design, drawing, constraints, angles, joint_points, traces, length, column })
+        let values = joint_values;
+        let idle = Vec::new();
+        let mut made =
+            Self { design, drawing, constraints, values, drives, idle, joint_points, traces, length, column };
+        made.idle = idle::find(&made);
+        Ok(made)
+    }
+
+    /// What counts as one of a drive in scaled equations: 1 rad, or L for a sliding one, mm.
+    pub(super) fn drive_scale(&self, drive: &JointValue) -> f64 {
+        match drive.unit() {
+            DriveUnit::Rad => 1.0,
+            DriveUnit::Mm => self.length,
+        }
     }
 
     /// Number of bodies that can move.
@@ -120,9 +141,10 @@ impl<'d> Mechanism<'d> {
         self.traces.iter().map(|(body, point)| poses[*body].point(point)).collect()
     }
 
-    /// Angle of every joint on the branch nearest `near`, rad.
-    pub fn joint_angles(&self, poses: &[Pose], near: &[f64]) -> Vec<f64> {
-        self.angles.iter().zip(near).map(|(angle, near)| angle.value(poses, *near)).collect()
+    /// Value of every joint, rad (on the branch nearest `near`) or mm; zero for joints without one.
+    pub fn joint_values(&self, poses: &[Pose], near: &[f64]) -> Vec<f64> {
+        let value = |(value, near): (&Option<JointValue>, &f64)| value.map_or(0.0, |v| v.value(poses, *near));
+        self.values.iter().zip(near).map(value).collect()
     }
 }
 
@@ -156,14 +178,17 @@ fn centers(
 /// Indices of a design may come from a file: nothing below may trip over them.
 fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
     let body = |id: &usize| *id < design.bodies.len();
-    let joints = design.joints.iter().all(|j| j.bodies.iter().all(body));
+    let joints = design.joints.iter().all(|j| j.bodies.len() > 1 && j.bodies.iter().all(body));
     let drives = design.drives.iter().all(|d| d.joint < design.joints.len());
     let traces = design.traces.iter().all(|t| body(&t.body));
     let moving = design.bodies.iter().filter(|b| !b.ground).count();
+    let steps = design.cycle.steps;
     let bounded = |d: &Drive| {
-        [d.rest_rad, d.profile.value_rad(0.0), d.profile.value_rad(1.0)]
-            .iter()
-            .all(|x| x.abs() <= MAX_DRIVE_RAD)
+        let most = match d.unit {
+            DriveUnit::Rad => MAX_DRIVE_RAD,
+            DriveUnit::Mm => MAX_DRIVE_MM,
+        };
+        d.rest.abs() <= most && (0..=steps).all(|i| d.value(i as f64 / steps as f64).abs() <= most)
     };
     let problem = if p.len() != design.free.len() {
         "the number of free values is not the design's"
@@ -173,21 +198,33 @@ fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
         "the mechanism has no link that could move"
     } else if moving > MAX_MOVING_BODIES {
         "more than 100 links are not available yet"
-    } else if design.cycle.steps == 0 {
+    } else if steps == 0 {
         "a cycle has at least one step"
-    } else if !design.drives.iter().all(bounded) {
-        "a drive turns at most 100 times in a cycle"
-    } else if work(design, moving) > MAX_WORK {
+    } else if steps as f64 * (moving as f64).powi(3) > MAX_WORK || steps > MAX_STEPS {
         "the cycle has too many steps for so many links"
+    } else if let Some(drive) = design.drives.iter().find(|d| !bounded(d)) {
+        return Err(vec![
+            Diagnostic::error(
+                "E0500",
+                format!("the drive `{}` has no value, or a huge one, somewhere in its cycle", drive.name),
+                drive.origin,
+            )
+            .help("a drive turns at most 100 times, or slides at most 10 m, in a cycle"),
+        ]);
+    } else if work(design, moving) > MAX_WORK {
+        "the drives go too far for so many links"
     } else {
         return Ok(());
     };
     Err(vec![Diagnostic::error("E0500", problem, design.origin)])
 }
 
+/// States and steps of the longest drive's way times what each costs. A sliding drive's way counts as if L were 1 mm.
 fn work(design: &Design, moving: usize) -> f64 {
-    let way = |d: &Drive| (d.profile.value_rad(1.0) - d.profile.value_rad(0.0)).abs() / 0.2;
-    let states = design.cycle.steps as f64 + design.drives.iter().map(way).fold(0.0, f64::max);
+    let steps = design.cycle.steps;
+    let at = |d: &Drive, i: usize| d.value(i as f64 / steps as f64);
+    let way = |d: &Drive| (0..steps).map(|i| (at(d, i + 1) - at(d, i)).abs()).sum::<f64>() / 0.2;
+    let states = steps as f64 + design.drives.iter().map(way).fold(0.0, f64::max);
     states * (moving as f64).powi(3)
 }
 
@@ -196,15 +233,4 @@ fn not_finite(what: &str, name: &str, origin: crate::ir::Origin) -> Diagnostic {
     Diagnostic::error("E0501", message, origin)
         .label("no such point at these values of the free variables")
         .help("check the lengths of the circles it is found from")
-}
-
-fn kind_name(kind: JointKind) -> &'static str {
-    match kind {
-        JointKind::Hinge => "hinge",
-        JointKind::Ball => "ball",
-        JointKind::Universal => "universal",
-        JointKind::Slider => "slider",
-        JointKind::Cylindrical => "cylindrical",
-        JointKind::Fixed => "fixed",
-    }
 }

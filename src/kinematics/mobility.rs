@@ -1,6 +1,7 @@
 //! Mobility by rank: freedoms = 6 · moving bodies − rank of the constraints at a generic pose. Counting joints
 //! (Grübler, Kutzbach) fails for every planar loop in space and for Bennett's linkage; rank does not.
 
+use super::idle::Idle;
 use super::linear::{Rank, Rows, moved};
 use super::mechanism::Mechanism;
 use super::path::correct;
@@ -20,8 +21,10 @@ const TAKES_PART: f64 = 1e-6;
 pub struct Mobility {
     /// Bodies that are not ground.
     pub moving_bodies: usize,
-    /// Independent motions with the drives released.
+    /// Independent motions with the drives released, idle ones not counted.
     pub freedoms: usize,
+    /// Idle freedoms: turns of a body about the line of its joints that move nothing else.
+    pub idle: Vec<Idle>,
     /// Number of drives.
     pub drives: usize,
     /// Scalar constraint equations.
@@ -45,6 +48,7 @@ impl Mobility {
         Self {
             moving_bodies: mechanism.moving_bodies(),
             freedoms: best.free.null.len(),
+            idle: mechanism.idle.clone(),
             drives,
             rows: best.free.rows,
             redundant: best.free.rows - best.free.rank,
@@ -90,6 +94,25 @@ impl Mobility {
         }
         None
     }
+
+    /// Idle freedoms of conventional joints, worth knowing: flexures would remove them.
+    pub fn advice(&self, mechanism: &Mechanism) -> Option<Diagnostic> {
+        let design = mechanism.design;
+        let conventional = |idle: &&Idle| idle.is_conventional(design);
+        let loose: Vec<&Idle> = self.idle.iter().filter(conventional).collect();
+        let first = design.bodies.get(loose.first()?.body)?;
+        let all = names(loose.iter().filter_map(|i| design.bodies.get(i.body)).map(|b| &b.name));
+        let verb = if loose.len() == 1 {
+            "turns idly about the line of its"
+        } else {
+            "turn idly about the line of their"
+        };
+        Some(
+            Diagnostic::advice("A0508", format!("{all} {verb} joints"), first.origin)
+                .label("nothing else moves with it, and nothing holds it")
+                .help("leave it so, or let a flexure or a universal joint hold one end"),
+        )
+    }
 }
 
 /// Ranks at one pose with the drives released and held.
@@ -100,8 +123,7 @@ struct Ranks {
 
 impl Ranks {
     fn at(mechanism: &Mechanism, poses: &[Pose]) -> Self {
-        let value = |d: &crate::ir::Drive| mechanism.angles[d.joint].value(poses, 0.0);
-        let drive: Vec<f64> = mechanism.design.drives.iter().map(value).collect();
+        let drive: Vec<f64> = mechanism.drives.iter().map(|d| d.value(poses, 0.0)).collect();
         let rows = Rows::at(mechanism, poses, &drive);
         Self { free: rows.rank(false), held: rows.rank(true) }
     }
@@ -118,7 +140,8 @@ impl Ranks {
                 way += v * share(i);
             }
             nudged.extend(correct(mechanism, &moved(mechanism, &mechanism.drawing, &way), &[]));
-            let drive: Vec<f64> = (0..mechanism.design.drives.len()).map(share).collect();
+            let drives = mechanism.drives.iter().enumerate();
+            let drive: Vec<f64> = drives.map(|(i, d)| share(i) * mechanism.drive_scale(d)).collect();
             nudged.extend(correct(mechanism, &mechanism.drawing, &drive));
         }
         let others = nudged.iter().map(|at| Self::at(mechanism, &at.poses));

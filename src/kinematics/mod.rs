@@ -1,14 +1,21 @@
 //! The conventional mechanism: constraints, assembly, mobility, motion.
 
 pub mod constraint;
+#[cfg(test)]
+mod derivative_tests;
+mod forms;
+mod idle;
 mod linear;
 pub mod mechanism;
 pub mod mobility;
 pub mod motion;
 mod path;
+pub mod value;
 
-pub use constraint::{Constraint, GeometryChange, HingeAngle, Jacobian};
+pub use constraint::{Constraint, GeometryChange, Jacobian};
+pub use idle::Idle;
 pub use linear::RANK_TOLERANCE;
 pub use mechanism::Mechanism;
 pub use mobility::Mobility;
 pub use motion::{JointSpan, Motion, State, solve_motion};
+pub use value::{HingeAngle, JointValue, Shift};

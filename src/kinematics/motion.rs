@@ -5,7 +5,7 @@ use super::mechanism::Mechanism;
 use super::mobility::{Mobility, names};
 use super::path::{Branch, Sample, Stuck};
 use crate::diagnostic::Diagnostic;
-use crate::ir::{BodyId, Design, JointId, JointKind};
+use crate::ir::{BodyId, Design, DriveUnit, JointId, JointKind};
 use crate::math::Pose;
 use nalgebra::Vector3;
 
@@ -20,12 +20,13 @@ const BREAKING: f64 = 0.1;
 /// The mechanism at one value of its drives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
-    /// Drive values, relative to the drawing pose, rad.
-    pub drive_rad: Vec<f64>,
+    /// Drive values, relative to the drawing pose, rad or mm.
+    pub drives: Vec<f64>,
     /// Pose of every body relative to the drawing pose.
     pub poses: Vec<Pose>,
-    /// Value of every joint (second body relative to the first), relative to the drawing pose and unwrapped, rad.
-    pub angles_rad: Vec<f64>,
+    /// Value of every joint (second body relative to the first), relative to the drawing pose and unwrapped: rad, for
+    /// sliders mm; zero for joints without one value (balls, universal and fixed joints).
+    pub joint_values: Vec<f64>,
     /// Position of every trace, mm.
     pub traces_mm: Vec<Vector3<f64>>,
 }
@@ -37,7 +38,7 @@ pub struct Motion {
     pub mobility: Mobility,
     /// Physical point of every joint in the drawing pose (with its layer's offset), mm.
     pub joint_points: Vec<Vector3<f64>>,
-    /// The rest pose: every drive at its `rest_rad`.
+    /// The rest pose: every drive at its `rest`.
     pub rest: State,
     /// States 0..=N of the cycle.
     pub states: Vec<State>,
@@ -74,7 +75,7 @@ impl Motion {
 
     /// How far a joint turns.
     pub fn span(&self, joint: JointId) -> JointSpan {
-        let at = |state: &State| state.angles_rad.get(joint).copied().unwrap_or(0.0);
+        let at = |state: &State| state.joint_values.get(joint).copied().unwrap_or(0.0);
         let rest = at(&self.rest);
         let (mut low, mut high) = (rest, rest);
         for angle in self.states.iter().map(at) {
@@ -97,7 +98,7 @@ impl Motion {
 /// # Errors
 /// What makes the mechanism impossible, each at the place that asked for it: E0500 and E0501 malformed, E0502
 /// mobility, E0503 cannot be assembled over the drives' range, E0504 a compliant joint that turns fully, E0505
-/// drawn at a dead point, E0901 not available yet.
+/// drawn at a dead point.
 pub fn solve_motion(design: &Design, p: &[f64]) -> Result<Motion, Vec<Diagnostic>> {
     let mechanism = Mechanism::new(design, p)?;
     let mobility = Mobility::of(&mechanism);
@@ -105,14 +106,14 @@ pub fn solve_motion(design: &Design, p: &[f64]) -> Result<Motion, Vec<Diagnostic
         return Err(vec![found]);
     }
     let steps = design.cycle.steps;
-    let drives = |t: f64| design.drives.iter().map(|d| d.profile.value_rad(t)).collect::<Vec<f64>>();
+    let drives = |t: f64| design.drives.iter().map(|d| d.value(t)).collect::<Vec<f64>>();
     let targets = (0..=steps).map(|i| drives(i as f64 / steps as f64));
     let (Some(mut to_rest), Some(mut cycle)) =
         (Branch::from_drawing(&mechanism), Branch::from_drawing(&mechanism))
     else {
         return Err(vec![drawn_at_dead_point(design)]);
     };
-    let rest: Vec<f64> = design.drives.iter().map(|d| d.rest_rad).collect();
+    let rest: Vec<f64> = design.drives.iter().map(|d| d.rest).collect();
     let rest = to_rest.advance(&rest).map_err(|stuck| vec![cannot_close(design, &stuck, Some(&rest))])?;
     let mut states = Vec::with_capacity(steps + 1);
     for target in targets {
@@ -123,8 +124,9 @@ pub fn solve_motion(design: &Design, p: &[f64]) -> Result<Motion, Vec<Diagnostic
     let mut crossed = to_rest.change_points;
     crossed.extend(cycle.change_points);
     crossed.dedup();
+    warnings.extend(mobility.advice(&mechanism));
     warnings.extend(change_point(design, &crossed));
-    let closed = design.drives.iter().all(|d| d.profile.is_closed());
+    let closed = design.drives.iter().all(|d| d.is_closed());
     if closed {
         warnings.extend(does_not_return(&mechanism, &states));
     }
@@ -142,16 +144,16 @@ pub fn solve_motion(design: &Design, p: &[f64]) -> Result<Motion, Vec<Diagnostic
 fn state(mechanism: &Mechanism, sample: Sample) -> State {
     State {
         traces_mm: mechanism.trace_points(&sample.poses),
-        drive_rad: sample.drive,
+        drives: sample.drive,
         poses: sample.poses,
-        angles_rad: sample.angles,
+        joint_values: sample.values,
     }
 }
 
 /// Compliant joints that would have to turn fully, one error each.
 fn full_turns(design: &Design, motion: &Motion, closed: bool) -> Vec<Diagnostic> {
     let winds = |id: JointId| {
-        let at = |s: Option<&State>| s.and_then(|s| s.angles_rad.get(id)).copied().unwrap_or(0.0);
+        let at = |s: Option<&State>| s.and_then(|s| s.joint_values.get(id)).copied().unwrap_or(0.0);
         closed && (at(motion.states.last()) - at(motion.states.first())).abs() > std::f64::consts::PI
     };
     let turns = |id: JointId| motion.span(id).span_rad >= FULL_TURN_RAD || winds(id);
@@ -186,9 +188,8 @@ fn drawn_at_dead_point(design: &Design) -> Diagnostic {
 
 /// The loop opens on the way: to the rest pose, if that is given, or over the cycle.
 fn cannot_close(design: &Design, stuck: &Stuck, rest: Option<&[f64]>) -> Diagnostic {
-    let value =
-        |(drive, rad): (&crate::ir::Drive, &f64)| format!("`{}` = {:.2} deg", drive.name, rad.to_degrees());
-    let list = |rad: &[f64]| design.drives.iter().zip(rad).map(value).collect::<Vec<_>>().join(", ");
+    let value = |(drive, v): (&crate::ir::Drive, &f64)| format!("`{}` = {}", drive.name, drive.unit.show(*v));
+    let list = |values: &[f64]| design.drives.iter().zip(values).map(value).collect::<Vec<_>>().join(", ");
     let whither = match rest {
         Some(rest) => format!(" on the way to the rest pose at {}", list(rest)),
         None => String::new(),
@@ -217,13 +218,14 @@ fn cannot_close(design: &Design, stuck: &Stuck, rest: Option<&[f64]>) -> Diagnos
 fn change_point(design: &Design, crossed: &[Vec<f64>]) -> Option<Diagnostic> {
     let first = crossed.first()?;
     let drive = design.drives.first()?;
-    let at = first.first()?.to_degrees();
+    let at = match drive.unit {
+        DriveUnit::Rad => format!("{:.1} deg", first.first()?.to_degrees()),
+        DriveUnit::Mm => format!("{:.2} mm", first.first()?),
+    };
     let more =
         if crossed.len() > 1 { format!(" (and {} more times)", crossed.len() - 1) } else { String::new() };
-    let message = format!(
-        "at `{}` = {at:.1} deg{more} two ways of going on cross; the smooth one was taken",
-        drive.name
-    );
+    let message =
+        format!("at `{}` = {at}{more} two ways of going on cross; the smooth one was taken", drive.name);
     Some(
         Diagnostic::warning("W0506", message, drive.origin)
             .label("a real mechanism may take the other way here")
@@ -231,11 +233,21 @@ fn change_point(design: &Design, crossed: &[Vec<f64>]) -> Option<Diagnostic> {
     )
 }
 
+fn apart(mechanism: &Mechanism, a: &Pose, b: &Pose) -> bool {
+    (a.translation - b.translation).norm() > RETURNED * mechanism.length
+        || (a.rotation - b.rotation).norm() > RETURNED
+}
+
 fn does_not_return(mechanism: &Mechanism, states: &[State]) -> Option<Diagnostic> {
     let (first, last) = (states.first()?, states.last()?);
-    let differs = first.poses.iter().zip(&last.poses).any(|(a, b)| {
-        (a.translation - b.translation).norm() > RETURNED * mechanism.length
-            || (a.rotation - b.rotation).norm() > RETURNED
+    let differs = first.poses.iter().zip(&last.poses).enumerate().any(|(body, (a, b))| {
+        let turned = match mechanism.idle.iter().find(|i| i.bodies.contains(&body)) {
+            // How far a body has turned idly means nothing.
+            Some(idle) if idle.body == body => (a.rotation - b.rotation) * idle.axis,
+            Some(_) => Vector3::zeros(),
+            None => return apart(mechanism, a, b),
+        };
+        (a.translation - b.translation).norm() > RETURNED * mechanism.length || turned.norm() > RETURNED
     });
     let drive = mechanism.design.drives.first()?;
     differs.then(|| {

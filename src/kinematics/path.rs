@@ -15,7 +15,7 @@ const CLOSED: f64 = 1e-13;
 const CLOSED_BY_ROUNDING: f64 = 1e-11;
 /// Corrector iterations; two to four are usual, thirty only exactly at a dead point.
 const MAX_ITERATIONS: usize = 30;
-/// Longest step of the drives, rad.
+/// Longest step of the drives, rad (of sliding ones, in lengths L, as all below).
 const MAX_STEP_RAD: f64 = 0.2;
 /// Shortest step of the drives, rad: 6e-5°. Shorter ones mean the mechanism cannot go on.
 const MIN_STEP_RAD: f64 = 1e-6;
@@ -79,7 +79,7 @@ pub(super) fn correct(mechanism: &Mechanism, start: &[Pose], drive: &[f64]) -> O
 pub(super) struct Sample {
     pub drive: Vec<f64>,
     pub poses: Vec<Pose>,
-    pub angles: Vec<f64>,
+    pub values: Vec<f64>,
 }
 
 /// The mechanism cannot follow its drives further.
@@ -87,13 +87,15 @@ pub(super) struct Sample {
 pub(super) struct Stuck {
     /// Drive values that were reached.
     pub drive: Vec<f64>,
-    /// Rate of every joint angle by the driven motion there: large in the loop that breaks.
+    /// Rate of turn in every joint by the driven motion there: large in the loop that breaks.
     pub rates: Vec<f64>,
 }
 
 /// The mechanism on its branch, followed from the drawing.
 pub(super) struct Branch<'m, 'd> {
     mechanism: &'m Mechanism<'d>,
+    /// What counts as one of each drive.
+    scales: Vec<f64>,
     here: Sample,
     rows: Rows,
     factor: Factor,
@@ -114,10 +116,11 @@ impl<'m, 'd> Branch<'m, 'd> {
         if at.factor.least_pivot < DEAD_POINT {
             return None;
         }
-        let angles = vec![0.0; mechanism.angles.len()];
+        let values = vec![0.0; mechanism.values.len()];
         Some(Self {
             mechanism,
-            here: Sample { drive, poses: at.poses, angles },
+            scales: mechanism.drives.iter().map(|d| mechanism.drive_scale(d)).collect(),
+            here: Sample { drive, poses: at.poses, values },
             rows: at.rows,
             factor: at.factor,
             before: None,
@@ -127,10 +130,11 @@ impl<'m, 'd> Branch<'m, 'd> {
         })
     }
 
-    /// Follows the drives on a straight line to `target` (rad) and gives the pose there.
+    /// Follows the drives on a straight line to `target` (rad or mm) and gives the pose there.
     pub fn advance(&mut self, target: &[f64]) -> Result<Sample, Stuck> {
         for _ in 0..MAX_ATTEMPTS {
-            let delta: Vec<f64> = target.iter().zip(&self.here.drive).map(|(t, d)| t - d).collect();
+            let way = target.iter().zip(&self.here.drive).map(|(t, d)| t - d);
+            let delta: Vec<f64> = way.zip(&self.scales).map(|(w, scale)| w / scale).collect();
             let length = delta.iter().fold(0.0, |m, d| f64::max(m, d.abs()));
             if length == 0.0 {
                 return Ok(self.here.clone());
@@ -140,7 +144,8 @@ impl<'m, 'd> Branch<'m, 'd> {
             let mut h = self.step.min(length);
             let mut drive = target.to_vec();
             if !whole {
-                drive = self.here.drive.iter().zip(&rate).map(|(d, r)| d + r * h).collect();
+                let steps = rate.iter().zip(&self.scales).map(|(r, scale)| r * h * scale);
+                drive = self.here.drive.iter().zip(steps).map(|(d, step)| d + step).collect();
             }
             match self.attempt(&rate, h, drive) {
                 Attempt::Accepted => {
@@ -183,8 +188,8 @@ impl<'m, 'd> Branch<'m, 'd> {
         if at.travel > MAX_CORRECTION * way.norm() {
             return Attempt::Refused;
         }
-        let angles = self.mechanism.joint_angles(&at.poses, &self.here.angles);
-        let sample = Sample { drive, poses: at.poses, angles };
+        let values = self.mechanism.joint_values(&at.poses, &self.here.values);
+        let sample = Sample { drive, poses: at.poses, values };
         if at.factor.least_pivot < DEAD_POINT {
             return Attempt::DeadPoint(sample);
         }
@@ -208,8 +213,9 @@ impl<'m, 'd> Branch<'m, 'd> {
     /// The pose at a target that is itself a dead point: between four poses around it if the mechanism passes it,
     /// else the pose as the corrector found it.
     fn bridge(&mut self, rate: &[f64], target: &[f64], found: &Sample) -> Result<Sample, Stuck> {
-        let at =
-            |k: f64| -> Vec<f64> { target.iter().zip(rate).map(|(t, r)| t + k * BRIDGE_RAD * r).collect() };
+        let aside = rate.iter().zip(&self.scales).map(|(r, scale)| r * BRIDGE_RAD * scale);
+        let aside: Vec<f64> = aside.collect();
+        let at = |k: f64| -> Vec<f64> { target.iter().zip(&aside).map(|(t, a)| t + k * a).collect() };
         let mut around = Vec::new();
         for k in [-2.0, -1.0, 1.0, 2.0] {
             match self.advance(&at(k)) {
@@ -228,7 +234,9 @@ impl<'m, 'd> Branch<'m, 'd> {
             Some(j) => Vector3::new(tangent[j + 3], tangent[j + 4], tangent[j + 5]),
             None => Vector3::zeros(),
         };
-        let rates = mechanism.angles.iter().map(|angle| (turn(angle.b) - turn(angle.a)).norm()).collect();
+        let rate =
+            |j: &crate::ir::Joint| j.pairs().map(|[a, b]| (turn(b) - turn(a)).norm()).fold(0.0, f64::max);
+        let rates = mechanism.design.joints.iter().map(rate).collect();
         Stuck { drive: self.here.drive.clone(), rates }
     }
 }
@@ -244,7 +252,7 @@ enum Attempt {
 fn middle(around: &[Sample]) -> Sample {
     const WEIGHTS: [f64; 4] = [-1.0 / 6.0, 4.0 / 6.0, 4.0 / 6.0, -1.0 / 6.0];
     let Some(first) = around.first() else {
-        return Sample { drive: Vec::new(), poses: Vec::new(), angles: Vec::new() };
+        return Sample { drive: Vec::new(), poses: Vec::new(), values: Vec::new() };
     };
     let mut out = first.clone();
     for (i, pose) in out.poses.iter_mut().enumerate() {
@@ -257,8 +265,8 @@ fn middle(around: &[Sample]) -> Sample {
         }
         pose.rotation = exp_so3(&turn) * base;
     }
-    for (i, angle) in out.angles.iter_mut().enumerate() {
-        *angle = around.iter().zip(WEIGHTS).map(|(sample, w)| sample.angles[i] * w).sum();
+    for (i, value) in out.values.iter_mut().enumerate() {
+        *value = around.iter().zip(WEIGHTS).map(|(sample, w)| sample.values[i] * w).sum();
     }
     out
 }

@@ -158,8 +158,7 @@ impl<'d> Problem<'d> {
             .map_init(
                 || SensitivityWorkspace::new(&trial.model),
                 |workspace, s| {
-                    let target: Vec<f64> =
-                        self.layout.drives.iter().map(|d| d.values_rad[s] - d.rest_rad).collect();
+                    let target: Vec<f64> = self.layout.drives.iter().map(|d| d.values[s] - d.rest).collect();
                     let view = self.view(&trial.model, &trial.cycle, s);
                     let sensitivity = workspace.at(&trial.model, view.equilibrium, &target).ok()?;
                     let mut part = Normal::new(n);

@@ -11,7 +11,7 @@ use crate::emit::csv::{MotionState, MotionTable};
 use crate::emit::stl::stl_bytes;
 use crate::equilibrium::{Cycle, Layout, Model, ModelError, SweepError, sweep};
 use crate::ir::{Design, Solution};
-use crate::kinematics::{Motion, solve_motion};
+use crate::kinematics::{Constraint, Motion, solve_motion};
 use crate::math::{Pose, log_so3};
 use crate::optimize::{self, Ending, Method, Problem};
 use nalgebra::Vector3;
@@ -58,7 +58,7 @@ impl Stages for Compiler {
             .states
             .iter()
             .map(|s| MotionState {
-                drives_rad: s.drive_rad.clone(),
+                drives: s.drives.clone(),
                 traces_mm: s.traces_mm.iter().map(|p| (*p).into()).collect(),
                 poses: moving(design, |b| relative(&motion, b, &s.poses[b])),
                 ..MotionState::default()
@@ -76,9 +76,9 @@ impl Stages for Compiler {
         let model = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
         let cycle = sweep(&model).map_err(|e| lost(design, &e))?;
         let states = cycle.states.iter().enumerate().map(|(s, e)| MotionState {
-            drives_rad: layout.drives.iter().map(|d| d.values_rad[s]).collect(),
+            drives: layout.drives.iter().map(|d| d.values[s]).collect(),
             traces_mm: layout.traces.iter().map(|t| e.state.poses[t.body].point(&t.rest).into()).collect(),
-            torques_n_mm: (0..layout.drives.len()).map(|d| e.torque_n_mm(&model, d)).collect(),
+            drive_loads: (0..layout.drives.len()).map(|d| e.drive_load(&model, d)).collect(),
             energy_n_mm: e.energy_n_mm,
             stress_max_mpa: e.max_stress_mpa(&model),
             poses: moving(design, |b| from_rest(&e.state.poses[b])),
@@ -143,6 +143,7 @@ impl Stages for Compiler {
     }
 
     fn mesh(&self, design: &Design, values: &[f64]) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
+        solids::available(design)?;
         let (layout, motion) = layout(design, values)?;
         let model = Model::new(design, &layout, values, MESH_EDGES, false).map_err(|e| no_rod(design, &e))?;
         let (parts, mut found) = solids::build(design, &layout, &motion, &model)?;
@@ -172,7 +173,7 @@ fn starts(design: &Design) -> Vec<f64> {
 
 fn table(design: &Design, has_forces: bool, states: Vec<MotionState>) -> MotionTable {
     MotionTable {
-        drives: design.drives.iter().map(|d| d.name.clone()).collect(),
+        drives: design.drives.iter().map(|d| (d.name.clone(), d.unit)).collect(),
         traces: design.traces.iter().map(|t| t.name.clone()).collect(),
         bodies: design.bodies.iter().filter(|b| !b.ground).map(|b| b.name.clone()).collect(),
         has_forces,
@@ -212,8 +213,8 @@ fn lost(design: &Design, error: &SweepError) -> Failed {
     let values: Vec<String> = design
         .drives
         .iter()
-        .zip(&error.last_drives_rad)
-        .map(|(d, v)| format!("{} = {:.2} deg", d.name, v.to_degrees()))
+        .zip(&error.last_drives)
+        .map(|(d, v)| format!("{} = {}", d.name, d.unit.show(*v)))
         .collect();
     let at = design.drives.first().map_or(design.origin, |d| d.origin);
     let message = format!("the mechanism cannot be followed to state {}", error.state);
@@ -238,12 +239,16 @@ fn judge(design: &Design, layout: &Layout, cycle: &Cycle) -> Vec<Diagnostic> {
         );
     }
     if let (true, Some(first), Some(last)) = (layout.closed, cycle.states.first(), cycle.states.last()) {
-        let apart = first
-            .state
-            .poses
-            .iter()
-            .zip(&last.state.poses)
-            .map(|(a, b)| (a.translation - b.translation).norm().max((a.rotation - b.rotation).norm()));
+        let idle = |body: usize| {
+            let gauge = |c: &Constraint| matches!(c, Constraint::Gauge { body: b, .. } if *b == body);
+            layout.constraints.iter().any(gauge)
+        };
+        let pairs = first.state.poses.iter().zip(&last.state.poses).enumerate();
+        let apart = pairs.map(|(body, (a, b))| {
+            // How far a body has turned idly means nothing.
+            let turned = if idle(body) { 0.0 } else { (a.rotation - b.rotation).norm() };
+            (a.translation - b.translation).norm().max(turned)
+        });
         if apart.fold(0.0, f64::max) > RETURNED {
             found.push(
                 Diagnostic::warning("W0604", "after a whole cycle the mechanism is not where it began", design.origin)

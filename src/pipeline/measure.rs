@@ -3,7 +3,7 @@
 use super::report::{DriveMeasures, GapMeasures, Measures, RequirementResult, StressMeasures, TraceMeasures};
 use super::stages::Simulation;
 use crate::diagnostic::Diagnostic;
-use crate::ir::{Aggregate, Design, Quantity, Requirement};
+use crate::ir::{Aggregate, Design, DriveUnit, Quantity, Requirement};
 
 /// Measures of a simulated cycle.
 pub fn measure(design: &Design, simulation: &Simulation) -> Measures {
@@ -23,9 +23,13 @@ pub fn measure(design: &Design, simulation: &Simulation) -> Measures {
         );
     }
     for (i, drive) in design.drives.iter().enumerate() {
-        let torques = series(simulation, &Quantity::Torque(i));
-        let max_torque_n_mm = aggregate(&torques, Aggregate::Max, closed).unwrap_or(f64::NAN);
-        measures.drives.insert(drive.name.clone(), DriveMeasures { max_torque_n_mm });
+        let loads = series(simulation, &Quantity::Torque(i));
+        let largest = aggregate(&loads, Aggregate::Max, closed).unwrap_or(f64::NAN);
+        let of_drive = match drive.unit {
+            DriveUnit::Rad => DriveMeasures::Torque { max_torque_n_mm: largest },
+            DriveUnit::Mm => DriveMeasures::Force { max_force_n: largest },
+        };
+        measures.drives.insert(drive.name.clone(), of_drive);
     }
     let stress = series(simulation, &Quantity::Stress);
     let max_mpa = if design.rods.is_empty() { None } else { aggregate(&stress, Aggregate::Max, closed) };
@@ -36,7 +40,7 @@ pub fn measure(design: &Design, simulation: &Simulation) -> Measures {
 
 /// Whether every drive is in the same pose at both ends of the cycle.
 pub fn is_closed(design: &Design) -> bool {
-    design.drives.iter().all(|d| d.profile.is_closed())
+    design.drives.iter().all(|d| d.is_closed())
 }
 
 /// Checks every `require` line; one that fails is also a diagnostic at its line.
@@ -88,6 +92,7 @@ fn unit(quantity: &Quantity) -> &'static str {
         Quantity::Error(_) => "mm",
         Quantity::Stress => "MPa",
         Quantity::Torque(_) => "N·mm",
+        Quantity::Force(_) => "N",
     }
 }
 
@@ -97,8 +102,8 @@ fn series(simulation: &Simulation, quantity: &Quantity) -> Vec<f64> {
     match *quantity {
         Quantity::Error(trace) => simulation.errors_mm.get(trace).cloned().unwrap_or_default(),
         Quantity::Stress => states.iter().map(|s| s.stress_max_mpa).collect(),
-        Quantity::Torque(drive) => {
-            states.iter().filter_map(|s| s.torques_n_mm.get(drive).map(|t| t.abs())).collect()
+        Quantity::Torque(drive) | Quantity::Force(drive) => {
+            states.iter().filter_map(|s| s.drive_loads.get(drive).map(|t| t.abs())).collect()
         }
     }
 }

@@ -30,10 +30,29 @@ pub struct TraceMeasures {
 }
 
 /// A drive's load.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct DriveMeasures {
-    /// Largest size of the torque, N·mm.
-    pub max_torque_n_mm: f64,
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum DriveMeasures {
+    /// Of a turning drive.
+    Torque {
+        /// Largest size of the torque, N·mm.
+        max_torque_n_mm: f64,
+    },
+    /// Of a sliding drive.
+    Force {
+        /// Largest size of the force, N.
+        max_force_n: f64,
+    },
+}
+
+impl DriveMeasures {
+    /// What was measured, its size, and its unit.
+    pub fn parts(self) -> (&'static str, f64, &'static str) {
+        match self {
+            Self::Torque { max_torque_n_mm } => ("largest torque", max_torque_n_mm, "N·mm"),
+            Self::Force { max_force_n } => ("largest force", max_force_n, "N"),
+        }
+    }
 }
 
 /// Stress over the cycle.

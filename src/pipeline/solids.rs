@@ -7,13 +7,15 @@ use crate::geometry::{
     BodySolid, Bore, Eye, Facets, FlexureSolid, Fusion, LeastGap, Member, Parts, PartsInput, build_parts,
     least_gap,
 };
-use crate::ir::{BodyId, Design, Joint, JointId, Realization};
+use crate::ir::{BodyId, Design, ExportKind, Joint, JointId, JointKind, Realization};
 use crate::kinematics::Motion;
 use crate::math::Pose;
 use nalgebra::Vector3;
 
 /// Points nearer than this are the same, mm.
 const SAME_POINT_MM: f64 = 1e-6;
+/// Sine of the angle between axes that count as parallel.
+const PARALLEL: f64 = 1e-9;
 /// Part of the clearance left round a motor's shaft in the body it turns: to be fixed with a screw or glue.
 const SHAFT_FIT: f64 = 0.5;
 
@@ -32,6 +34,47 @@ pub fn build(
         .map_err(|e| vec![Diagnostic::error("E0630", format!("no solid comes out: {e}"), design.origin)])?;
     let found = parts.fusions.iter().map(|f| fusion(design, f)).collect();
     Ok((parts, found))
+}
+
+/// Whether every conventional joint has a printable form.
+///
+/// # Errors
+/// Joints whose form is not there yet, each at its place.
+pub fn available(design: &Design) -> Result<(), Failed> {
+    let missing = |joint: &&Joint| {
+        let plain = joint.kind == JointKind::Hinge && joint.bodies.len() == 2;
+        !joint.is_compliant() && !plain
+    };
+    let told = |joint: &Joint| {
+        let what = match joint.kind {
+            JointKind::Hinge => "hinge of more than two bodies".to_string(),
+            kind => format!("{} joint", kind.name()),
+        };
+        let message = format!("the printed form of a conventional {what} is not available yet");
+        let found = Diagnostic::error("E0901", message, joint.origin);
+        match design.exports.iter().find(|e| e.kind == ExportKind::Stl) {
+            Some(export) => found.also(export.origin, "asked for here"),
+            None => found,
+        }
+        .help("without `export stl` the mechanism can be checked, simulated and solved")
+    };
+    let found: Vec<Diagnostic> = design.joints.iter().filter(missing).map(told).collect();
+    if !found.is_empty() {
+        return Err(found);
+    }
+    let axis = Vector3::from(design.layers.axis);
+    let skew = |j: &&Joint| !j.is_compliant() && Vector3::from(j.axis).cross(&axis).norm() > PARALLEL;
+    match design.joints.iter().find(skew) {
+        None => Ok(()),
+        Some(joint) => Err(vec![
+            Diagnostic::error(
+                "E0901",
+                "the printed form of conventional hinges with different axes is not available yet",
+                joint.origin,
+            )
+            .help("without `export stl` the mechanism can be checked, simulated and solved"),
+        ]),
+    }
 }
 
 fn parts_input(design: &Design, layout: &Layout, motion: &Motion, model: &Model) -> PartsInput {

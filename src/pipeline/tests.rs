@@ -5,8 +5,8 @@ use crate::diagnostic::SourceMap;
 use crate::emit::csv::{MotionState, MotionTable};
 use crate::ir::expr::ExprGraph;
 use crate::ir::{
-    Aggregate, Cycle, Export, FreeVariable, JointId, Layers, Material, Motor, MotorInterface, Objective,
-    ObjectiveKind, Process, Profile, Quantity, Requirement, Trace,
+    Aggregate, Cycle, DriveUnit, Export, FreeVariable, JointId, Layers, Material, Motor, MotorInterface,
+    Objective, ObjectiveKind, Process, Profile, Quantity, Requirement, Trace,
 };
 use std::cell::Cell;
 use std::sync::atomic::Ordering;
@@ -34,8 +34,9 @@ fn design() -> Design {
         drives: vec![crate::ir::Drive {
             name: "motor".into(),
             joint: hinge,
-            profile: Profile::Range { from_rad: 0.0, to_rad: std::f64::consts::TAU },
-            rest_rad: 0.0,
+            unit: DriveUnit::Rad,
+            profile: Profile::Range { from: 0.0, to: std::f64::consts::TAU },
+            rest: 0.0,
             motor: Some(Motor {
                 name: "m".into(),
                 interface: MotorInterface::Stepper { steps_per_turn: 200, microsteps: 8 },
@@ -108,7 +109,7 @@ impl Stages for Toy {
     fn simulate(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
         let n = design.cycle.steps + 1;
         let state =
-            MotionState { traces_mm: vec![[0.0; 3]], torques_n_mm: vec![-7.0], ..MotionState::default() };
+            MotionState { traces_mm: vec![[0.0; 3]], drive_loads: vec![-7.0], ..MotionState::default() };
         let bodies = vec!["a".into()];
         Ok(Simulation {
             motion: MotionTable { states: vec![state; n], bodies, ..Default::default() },
@@ -174,7 +175,7 @@ fn solves_measures_and_emits() {
     assert!(!out.failed(), "{:?}", out.diagnostics);
     assert_eq!(out.before.as_ref().unwrap().traces["tip"].max_error_mm, 2.0);
     assert_eq!(out.after.as_ref().unwrap().traces["tip"].mean_error_mm, 0.25);
-    assert_eq!(out.after.as_ref().unwrap().drives["motor"].max_torque_n_mm, 7.0);
+    assert_eq!(out.after.as_ref().unwrap().drives["motor"].parts(), ("largest torque", 7.0, "N·mm"));
     assert_eq!(out.after.as_ref().unwrap().stress.max_mpa, None, "there are no rods");
     let names: Vec<&str> = out.artefacts.iter().map(|a| a.name.as_str()).collect();
     assert_eq!(names, ["toy.stl", "toy_motor/toy_motor.ino"]);

@@ -146,7 +146,7 @@ pub enum StatementKind {
         /// `layer N`.
         layer: Option<Expr>,
     },
-    /// `KIND NAME: A to B[, C] at P [axis D] [layer N] [pin D] [into BODY toward Q]… [as TEMPLATE [{ … }]]`
+    /// `KIND NAME: A to B[, C] at P [axis D [and E]] [layer N] [pin D] [into BODY toward Q]… [as TEMPLATE [{ … }]]`
     Joint(Box<Joint>),
     /// `material NAME`
     Material(Ident),
@@ -231,6 +231,8 @@ pub struct Joint {
     pub point: Expr,
     /// `axis D`: `x`, `y`, `z` as [`ExprKind::Name`], or a tuple.
     pub axis: Option<Expr>,
+    /// `and E` after the axis.
+    pub second_axis: Option<Expr>,
     /// `layer N`.
     pub layer: Option<Expr>,
     /// `pin D`.
@@ -255,8 +257,17 @@ pub struct TemplateUse {
 pub enum Profile {
     /// `from A to B`
     Range(Expr, Expr),
-    /// A form this version does not have yet (`by …`): its place.
-    Later(Origin),
+    /// `by EXPRESSION`: of t, which runs from 0 to 1.
+    By(Expr),
+    /// `by keys linear { 0 %: A, 25 %: B, … }`, or `smooth`
+    Keys {
+        /// `smooth` was written.
+        smooth: bool,
+        /// Time and value of each key.
+        keys: Vec<(Expr, Expr)>,
+        /// From `by` to `}`.
+        at: Origin,
+    },
 }
 
 /// A term of the objective.

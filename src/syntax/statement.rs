@@ -87,6 +87,7 @@ impl Lower<'_> {
             bodies: self.idents(node.first(Kind::Bodies)?),
             point: self.value(node)?,
             axis: None,
+            second_axis: None,
             layer: None,
             pin: None,
             into: Vec::new(),
@@ -105,7 +106,10 @@ impl Lower<'_> {
             }
             seen.push((kind, self.origin(clause)));
             match kind {
-                Kind::Axis => joint.axis = self.value(clause),
+                Kind::Axis => {
+                    let mut axes = self.values(clause).into_iter();
+                    (joint.axis, joint.second_axis) = (axes.next(), axes.next());
+                }
                 Kind::Layer => joint.layer = self.value(clause),
                 Kind::Pin => joint.pin = self.value(clause),
                 Kind::Into => joint.into.extend(self.ident(clause).zip(self.value(clause))),
@@ -139,16 +143,27 @@ impl Lower<'_> {
         if let Some(drum) = node.first(Kind::Drum).and_then(|n| n.first(Kind::Keyword)) {
             return Some(StatementKind::Later { keyword: self.named(drum) });
         }
-        let profile = match (node.first(Kind::Range), node.first(Kind::By)) {
-            (Some(range), _) => {
-                let mut values = self.values(range).into_iter();
+        let form = node.parts().find(|n| matches!(n.kind, Kind::Range | Kind::By | Kind::Keys))?;
+        let profile = match form.kind {
+            Kind::Range => {
+                let mut values = self.values(form).into_iter();
                 Profile::Range(values.next()?, values.next()?)
             }
-            (_, Some(by)) => Profile::Later(self.origin(by)),
-            _ => return None,
+            Kind::By => Profile::By(self.value(form)?),
+            _ => self.keys(form),
         };
         let continuous = node.all(Kind::Keyword).any(|n| self.text(n) == "continuous");
         Some(StatementKind::Drive { joint, profile, motor, continuous })
+    }
+
+    fn keys(&mut self, node: &Node) -> Profile {
+        let smooth = node.all(Kind::Keyword).any(|n| self.text(n) == "smooth");
+        let mut keys = Vec::new();
+        for key in node.all(Kind::Key) {
+            let mut values = self.values(key).into_iter();
+            keys.extend(values.next().zip(values.next()));
+        }
+        Profile::Keys { smooth, keys, at: self.origin(node) }
     }
 
     fn minimize(&mut self, node: &Node) -> StatementKind {

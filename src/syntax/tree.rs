@@ -65,6 +65,8 @@ pub enum Kind {
     Drive,
     Range,
     By,
+    Keys,
+    Key,
     Drum,
     Rest,
     Trace,

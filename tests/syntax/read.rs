@@ -159,16 +159,63 @@ fn statements_of_the_whole_language_are_known_by_their_keyword() {
         .iter()
         .map(|s| match s {
             StatementKind::Later { keyword } => keyword.node.clone(),
-            StatementKind::Drive { profile: Profile::Later(_), motor, continuous, .. } => {
-                format!("by {:?} {continuous}", motor.as_ref().map(|m| m.node.as_str()))
+            StatementKind::Drive {
+                profile: Profile::Keys { smooth: false, keys, .. },
+                motor,
+                continuous,
+                ..
+            } => {
+                format!("{} keys {:?} {continuous}", keys.len(), motor.as_ref().map(|m| m.node.as_str()))
             }
             other => panic!("{other:?}"),
         })
         .collect();
     assert_eq!(
         words,
-        ["place", "mirror", "mount", "string", "body", "assert", "by Some(\"xl320\") true", "drum", "load"]
+        [
+            "place",
+            "mirror",
+            "mount",
+            "string",
+            "body",
+            "assert",
+            "2 keys Some(\"xl320\") true",
+            "drum",
+            "load"
+        ]
     );
+}
+
+#[test]
+fn drives_have_three_forms_and_universal_joints_two_axes() {
+    let kinds = statements(
+        "drive a from 0 deg to 90 deg
+        drive b by 20 deg * sin(360 deg * t) + keys with xl320
+        drive c by keys smooth { 0 %: 0 mm
+            50 %: 2 * r // half
+            100 %: 0 mm, }
+        universal hook: base to rod at P axis y and (0, 0, 1) layer 2",
+    );
+    let forms: Vec<String> = kinds
+        .iter()
+        .map(|s| match s {
+            StatementKind::Drive { profile: Profile::Range(..), .. } => "range".into(),
+            StatementKind::Drive { profile: Profile::By(e), motor, .. } => {
+                format!("by {} {}", matches!(e.kind, ExprKind::Binary(..)), motor.is_some())
+            }
+            StatementKind::Drive { profile: Profile::Keys { smooth, keys, .. }, .. } => {
+                format!("keys {smooth} {}", keys.len())
+            }
+            StatementKind::Joint(j) => format!(
+                "{} {} {}",
+                j.axis.is_some(),
+                matches!(j.second_axis.as_ref().map(|e| &e.kind), Some(ExprKind::Tuple(_))),
+                j.layer.is_some()
+            ),
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    assert_eq!(forms, ["range", "by true true", "keys true 3", "true true true"]);
 }
 
 #[test]

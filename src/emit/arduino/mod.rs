@@ -1,7 +1,7 @@
 //! `export arduino(DRIVE)`: a sketch that runs a stepper motor through the cycle, pulse by pulse.
 //! All rounding happens here, once, on absolute positions: the sketch only counts.
 
-use crate::ir::{Design, MotorInterface};
+use crate::ir::{Design, DriveUnit, MotorInterface};
 use serde::Serialize;
 use std::f64::consts::TAU;
 use std::fmt;
@@ -46,6 +46,8 @@ pub struct Sketch {
 pub enum SketchError {
     /// The design has no such drive.
     NoDrive,
+    /// The drive slides: no motor turns it.
+    Slides,
     /// The drive names no motor.
     NoMotor,
     /// The motor is not a stepper.
@@ -87,6 +89,7 @@ impl fmt::Display for SketchError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoDrive => write!(f, "there is no such drive"),
+            Self::Slides => write!(f, "the drive slides: no motor turns it"),
             Self::NoMotor => write!(f, "the drive has no motor"),
             Self::NotAStepper { motor } => {
                 write!(f, "`{motor}` is not a stepper, and sketches for other motors are not available yet")
@@ -143,6 +146,9 @@ impl Sketch {
     /// When there is no such drive, or its motor is not a stepper.
     pub fn of(design: &Design, drive: usize) -> Result<Self, SketchError> {
         let drive = design.drives.get(drive).ok_or(SketchError::NoDrive)?;
+        if drive.unit != DriveUnit::Rad {
+            return Err(SketchError::Slides);
+        }
         let motor = drive.motor.as_ref().ok_or(SketchError::NoMotor)?;
         let MotorInterface::Stepper { steps_per_turn, microsteps } = motor.interface else {
             return Err(SketchError::NotAStepper { motor: motor.name.clone() });
@@ -151,7 +157,7 @@ impl Sketch {
         if states == 0 || states > MOST_STATES {
             return Err(SketchError::States { states });
         }
-        let angle = |state| drive.profile.value_rad(state as f64 / states as f64) - drive.rest_rad;
+        let angle = |state| drive.value(state as f64 / states as f64) - drive.rest;
         Ok(Self {
             mechanism: design.name.clone(),
             drive: drive.name.clone(),
@@ -159,8 +165,8 @@ impl Sketch {
             microsteps,
             angles_rad: (0..=states).map(angle).collect(),
             duration_s: design.cycle.duration_s,
-            closed: drive.profile.is_closed(),
-            rest_rad: drive.rest_rad,
+            closed: drive.is_closed(),
+            rest_rad: drive.rest,
         })
     }
 

@@ -1,0 +1,122 @@
+//! Idle freedoms: a body whose joint points lie on one line (a rod between two balls) may turn about it, and nothing
+//! else moves. They are found by rank: which combinations of such turns violate no constraint and no drive.
+
+use super::constraint::Constraint;
+use super::linear::{RANK_TOLERANCE, Rows};
+use super::mechanism::Mechanism;
+use crate::ir::{BodyId, Design};
+use nalgebra::{DMatrix, DVector, Vector3};
+
+/// Points this near to a line, in lengths L, lie on it. Drawn points are exact to 1e-14 of that.
+const ON_LINE: f64 = 1e-9;
+/// Bodies with a smaller share in an idle freedom (of unit length) take no part in it.
+const TAKES_PART: f64 = 1e-6;
+
+/// One idle freedom.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Idle {
+    /// The body whose turn is held as its gauge.
+    pub body: BodyId,
+    /// The line of the turn: unit direction as drawn.
+    pub axis: Vector3<f64>,
+    /// All bodies that take part.
+    pub bodies: Vec<BodyId>,
+}
+
+impl Idle {
+    /// Whether no flexure holds any of its bodies.
+    pub fn is_conventional(&self, design: &Design) -> bool {
+        let part = |b: &BodyId| self.bodies.contains(b);
+        !design.joints.iter().any(|j| j.is_compliant() && j.bodies.iter().any(part))
+    }
+
+    /// Its gauge for poses in whose reference pose the body's axis is `axis`.
+    pub fn gauge(&self, axis: Vector3<f64>) -> Constraint {
+        Constraint::Gauge { body: self.body, axis }
+    }
+}
+
+/// Idle freedoms of a mechanism as drawn (which must have none set yet).
+pub(super) fn find(mechanism: &Mechanism) -> Vec<Idle> {
+    let lines: Vec<(BodyId, Vector3<f64>)> = (0..mechanism.design.bodies.len())
+        .filter(|b| mechanism.column[*b].is_some())
+        .filter_map(|b| Some((b, line(mechanism, b)?)))
+        .collect();
+    let turns: Vec<DVector<f64>> = lines.iter().map(|(b, d)| turn(mechanism, *b, d)).collect();
+    if turns.is_empty() {
+        return Vec::new();
+    }
+    let drive: Vec<f64> = mechanism.drives.iter().map(|d| d.value(&mechanism.drawing, 0.0)).collect();
+    let mut violation = Rows::at(mechanism, &mechanism.drawing, &drive).times(&turns);
+    if violation.nrows() < violation.ncols() {
+        violation = violation.insert_rows(0, turns.len(), 0.0);
+    }
+    let svd = violation.svd(false, true);
+    let Some(v_t) = svd.v_t else { return Vec::new() };
+    let zero = (0..turns.len()).filter(|i| svd.singular_values[*i] <= RANK_TOLERANCE);
+    let basis: Vec<DVector<f64>> = zero.map(|i| v_t.row(i).transpose()).collect();
+    pivots(DMatrix::from_fn(basis.len(), turns.len(), |i, j| basis[i][j]))
+        .into_iter()
+        .map(|(pivot, members)| Idle {
+            body: lines[pivot].0,
+            axis: lines[pivot].1,
+            bodies: members.into_iter().map(|m| lines[m].0).collect(),
+        })
+        .collect()
+}
+
+/// Direction of the line through all joint points and traces of a body, if there is one.
+fn line(mechanism: &Mechanism, body: BodyId) -> Option<Vector3<f64>> {
+    let design = mechanism.design;
+    let own = design.joints.iter().zip(&mechanism.joint_points).filter(|(j, _)| j.bodies.contains(&body));
+    let joints: Vec<&Vector3<f64>> = own.map(|(_, p)| p).collect();
+    let start = *joints.first()?;
+    let far = joints.iter().map(|p| *p - start).max_by(|a, b| a.norm().total_cmp(&b.norm()))?;
+    let direction = far.try_normalize(ON_LINE * mechanism.length)?;
+    let traced = mechanism.traces.iter().filter(|t| t.0 == body).map(|t| &t.1);
+    let off = joints.into_iter().chain(traced).map(|p| direction.cross(&(p - start)).norm());
+    (off.fold(0.0, f64::max) <= ON_LINE * mechanism.length).then_some(direction)
+}
+
+/// Scaled motion of a body that turns about its line. Its centre lies on the line.
+fn turn(mechanism: &Mechanism, body: BodyId, direction: &Vector3<f64>) -> DVector<f64> {
+    let mut out = DVector::zeros(mechanism.unknowns());
+    if let Some(first) = mechanism.column[body] {
+        out.fixed_rows_mut::<3>(first + 3).copy_from(direction);
+    }
+    out
+}
+
+/// A column for each row of a basis, by elimination with full pivoting, and the columns with a share in that row.
+fn pivots(mut basis: DMatrix<f64>) -> Vec<(usize, Vec<usize>)> {
+    let mut found: Vec<usize> = Vec::new();
+    for done in 0..basis.nrows() {
+        let mut best = (done, 0, 0.0);
+        for j in 0..basis.ncols() {
+            for i in done..basis.nrows() {
+                if basis[(i, j)].abs() > best.2 {
+                    best = (i, j, basis[(i, j)].abs());
+                }
+            }
+        }
+        let (row, column, _) = best;
+        basis.swap_rows(done, row);
+        for i in 0..basis.nrows() {
+            if i != done && basis[(done, column)] != 0.0 {
+                let factor = basis[(i, column)] / basis[(done, column)];
+                for j in 0..basis.ncols() {
+                    basis[(i, j)] -= factor * basis[(done, j)];
+                }
+            }
+        }
+        found.push(column);
+    }
+    let members = |i: usize| -> Vec<usize> {
+        let least = TAKES_PART * basis.row(i).norm();
+        (0..basis.ncols()).filter(|j| basis[(i, *j)].abs() > least).collect()
+    };
+    let mut out: Vec<(usize, Vec<usize>)> =
+        found.iter().enumerate().map(|(i, column)| (*column, members(i))).collect();
+    out.sort();
+    out
+}
