@@ -19,6 +19,8 @@ pub trait Real:
     fn value(&self) -> f64;
     /// Square root.
     fn sqrt(self) -> Self;
+    /// Exponential.
+    fn exp(self) -> Self;
     /// Angle of the point (`x`, `self`), rad.
     fn atan2(self, x: Self) -> Self;
     /// Product with a constant.
@@ -34,6 +36,9 @@ impl Real for f64 {
     }
     fn sqrt(self) -> Self {
         f64::sqrt(self)
+    }
+    fn exp(self) -> Self {
+        f64::exp(self)
     }
     fn atan2(self, x: Self) -> Self {
         f64::atan2(self, x)
@@ -134,6 +139,10 @@ impl<const N: usize> Real for Dual<N> {
         let root = self.re.sqrt();
         self.chain(root, 0.5 / root)
     }
+    fn exp(self) -> Self {
+        let value = self.re.exp();
+        self.chain(value, value)
+    }
     fn atan2(self, x: Self) -> Self {
         let r2 = self.re * self.re + x.re * x.re;
         Self { re: self.re.atan2(x.re), eps: Self::combine(&self.eps, x.re / r2, &x.eps, -self.re / r2) }
@@ -149,7 +158,7 @@ mod tests {
 
     fn sample<T: Real>(x: T, y: T) -> T {
         let r = (x * x + y.scale(3.0) * y).sqrt();
-        (x - y).atan2(r) / (x + T::constant(2.0)) + -y * x
+        (x - y).atan2(r) / (x + T::constant(2.0)) + -y * (x * y).exp()
     }
 
     #[test]

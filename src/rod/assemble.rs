@@ -4,6 +4,7 @@
 //! θ₁, x₂, θ₂, …, x_{N−2}, θ_{N−2} (internal), x_{N−1}, θ_{N−1}, e_{N−1} (what link B carries). Slot k of
 //! three numbers begins at 4k, θ_j is number 4j + 3; the half bandwidth is 10 throughout.
 
+use super::shear::ShearSystem;
 use super::stencil::{Block, EdgeFrame, Local, VertexMeasures};
 use super::{Rod, RodState};
 use crate::math::Pose;
@@ -24,8 +25,8 @@ pub struct RodSystem {
     pub(crate) energy: f64,
     pub(crate) frames: Vec<EdgeFrame>,
     pub(crate) measures: Vec<VertexMeasures>,
-    edge_gradient: Vec<Local>,
-    edge_hessian: Vec<Block>,
+    pub(crate) edge_gradient: Vec<Local>,
+    pub(crate) edge_hessian: Vec<Block>,
     mixed: Vec<Block>,
     /// Axial force EA ε per edge, N.
     pub(crate) axial_force: Vec<f64>,
@@ -47,6 +48,8 @@ pub struct RodSystem {
     pub(crate) increment: Vec<f64>,
     pub(crate) columns: Option<Box<super::sensitivity::ParameterColumns>>,
     pub(crate) twist_scale: f64,
+    /// Only for rods with shear.
+    pub(crate) shear: Option<Box<ShearSystem>>,
     /// Shift of the factors in use; none since the last assembly.
     pub(crate) factored: Option<f64>,
 }
@@ -81,7 +84,7 @@ impl RodSystem {
     /// Workspace for rods with as many edges as `rod`.
     pub fn new(rod: &Rod) -> Self {
         let n = rod.edges;
-        let internal = rod.internal_freedoms();
+        let internal = rod.band_freedoms();
         Self {
             n,
             energy: 0.0,
@@ -106,6 +109,7 @@ impl RodSystem {
             increment: vec![0.0; internal],
             columns: None,
             twist_scale: 1.0,
+            shear: (!rod.shear.is_empty()).then(|| Box::new(ShearSystem::new(n))),
             factored: None,
         }
     }
@@ -126,7 +130,8 @@ impl RodSystem {
         &self.link_gradient
     }
 
-    /// Euclidean norm of the internal gradient with moments divided by the edge length, N.
+    /// Euclidean norm of the internal gradient with moments divided by the edge length, N. With shear it
+    /// contains what the slip misses, in N by the rod's shear stiffness.
     pub fn internal_residual_norm(&self) -> f64 {
         let square: f64 = self
             .internal_gradient()
@@ -135,7 +140,8 @@ impl RodSystem {
             .map(|(i, g)| if i % 4 == 0 { g / self.twist_scale } else { *g })
             .map(|g| g * g)
             .sum();
-        square.sqrt()
+        let shear = self.shear.as_deref().map_or(0.0, |s| s.residual_square());
+        (square + shear).sqrt()
     }
 
     /// Largest internal force (resultant over the edges, clamped ones left out), N.
@@ -165,6 +171,7 @@ impl RodSystem {
         self.factored = None;
         self.twist_scale = rod.edge_length_mm();
         self.local_terms(rod, state);
+        self.shear_terms(rod, state);
         self.gradient.fill(0.0);
         self.band.fill([0.0; COLUMN]);
         for j in 0..n {
@@ -173,11 +180,13 @@ impl RodSystem {
         for i in 1..n {
             self.scatter_mixed(i);
         }
-        for (end, pose) in [pose_a, pose_b].into_iter().enumerate() {
+        let pose_b = rod.chain_pose(state, pose_b);
+        for (end, pose) in [pose_a, &pose_b].into_iter().enumerate() {
             let vertex = if end == 0 { 1 } else { n - 1 };
             self.arms[end] = state.vertices[vertex] - (pose.center + pose.translation);
             self.link_terms(end);
         }
+        self.shear_columns(rod);
     }
 
     /// Energies with derivatives in the edges' local coordinates.
@@ -359,9 +368,12 @@ impl Rod {
                     energy += 0.5 * b * (v - r) * (v - r);
                 }
             }
+            if let Some(c) = self.shear.get(j) {
+                energy += 0.5 * c * frame.t.dot(&state.force).powi(2);
+            }
             previous = Some(frame);
         }
-        energy
+        energy + self.slip_energy(state)
     }
 }
 

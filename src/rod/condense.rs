@@ -32,9 +32,9 @@ impl RodSystem {
     /// Factors the internal Hessian; if it is not positive definite, shifts it until it is. The same
     /// shifted matrix then serves [`Self::condense`] and [`Self::back_substitute`].
     pub fn factor(&mut self) -> FactorReport {
-        let mut report = self.factor_unshifted();
+        let mut report = self.factor_band();
         if report.positive_definite {
-            return report;
+            return self.factor_shear(report, true);
         }
         let internal = FIRST_INTERNAL..4 * self.n - 4;
         let diagonal = internal.clone().filter(|i| !(i + 1).is_multiple_of(4)).map(|i| self.band[i][0].abs());
@@ -47,15 +47,20 @@ impl RodSystem {
                 self.factored = Some(shift);
                 report.shift = shift;
                 report.positive_definite = true;
-                return report;
+                return self.factor_shear(report, true);
             }
             shift *= SHIFT_GROWTH;
         }
-        report
+        self.factor_shear(report, true)
     }
 
     /// Factors the internal Hessian as it is, for the inertia at an accepted state and for sensitivities.
     pub fn factor_unshifted(&mut self) -> FactorReport {
+        let report = self.factor_band();
+        self.factor_shear(report, false)
+    }
+
+    fn factor_band(&mut self) -> FactorReport {
         let negative = self.factors.factor(&self.band[FIRST_INTERNAL..4 * self.n - 4], |_| 0.0);
         self.factored = Some(0.0);
         FactorReport {
@@ -84,6 +89,14 @@ impl RodSystem {
     /// Condenses the factored system onto the links: gradient (12) and Hessian (12 by 12), ordered du_A,
     /// dφ_A, du_B, dφ_B. Call after [`Self::factor`] or [`Self::factor_unshifted`].
     pub fn condense(&mut self) -> (&SVector<f64, 12>, &SMatrix<f64, 12, 12>) {
+        if self.shear.is_none() {
+            self.condense_band();
+        }
+        (&self.condensed_gradient, &self.condensed_hessian)
+    }
+
+    /// Condenses what is in the band; with shear, [`Self::factor_shear`] goes on from there.
+    pub(crate) fn condense_band(&mut self) {
         let n = self.factors.order();
         let (a, b) = (self.coupling(0), self.coupling(1));
         self.reduced.fill([0.0; 8]);
@@ -144,7 +157,6 @@ impl RodSystem {
                 self.condensed_hessian[(j, i)] = mean;
             }
         }
-        (&self.condensed_gradient, &self.condensed_hessian)
     }
 
     /// Gradient of the last [`Self::condense`].
@@ -168,10 +180,14 @@ impl RodSystem {
         self.reduced_b = tail;
     }
 
-    /// Internal increment −K⁻¹(g_int + C d) of the links' increment `d`, ordered θ₁, x₂, θ₂, …; for
+    /// Internal increment −K⁻¹(g_int + C d) of the links' increment `d`, ordered θ₁, x₂, θ₂, …, with shear then
+    /// slip and force; for
     /// [`Rod::retract`](super::Rod::retract). Call after [`Self::condense`].
     pub fn back_substitute(&mut self, d_link: &SVector<f64, 12>) -> &[f64] {
         let n = self.factors.order();
+        let mut chain = *d_link;
+        let extra = self.shear_increment(&mut chain);
+        let d_link = &chain;
         for (x, y) in self.solution.iter_mut().zip(&self.reduced) {
             let mut sum = y[6];
             for c in 0..6 {
@@ -184,9 +200,18 @@ impl RodSystem {
                 x[0] -= y[c] * d_link[6 + c];
             }
         }
+        if let (Some(shear), Some(extra)) = (&self.shear, &extra) {
+            for (x, y) in self.solution.iter_mut().zip(&shear.reduced) {
+                x[0] -= y[0] * extra[3] + y[1] * extra[4] + y[2] * extra[5];
+            }
+        }
         self.factors.backward(&mut self.solution);
         for (to, from) in self.increment.iter_mut().zip(&self.solution) {
             *to = from[0];
+        }
+        if let Some(extra) = extra {
+            self.increment.truncate(n);
+            self.increment.extend_from_slice(extra.as_slice());
         }
         &self.increment
     }

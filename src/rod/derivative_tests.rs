@@ -41,10 +41,31 @@ pub(crate) struct Sample {
     pub(crate) b: Pose,
 }
 
-/// A state bent and twisted at random.
+/// Kinds of rods every derivative is tested for.
+pub(crate) fn kinds() -> [RodOptions; 4] {
+    let plain = RodOptions::default();
+    let corrected = RodModel::Corrected.corrections();
+    [
+        plain,
+        RodOptions { section: SectionShape::Rectangle, ..plain },
+        RodOptions { corrections: corrected, ..plain },
+        RodOptions {
+            section: SectionShape::Rectangle,
+            frames: RestFrames::Transport,
+            corrections: corrected,
+        },
+    ]
+}
+
+/// A state bent and twisted at random, of a plain rod.
 pub(crate) fn random_sample(seed: u64, edges: usize) -> Sample {
+    sample_of(seed, edges, RodOptions::default())
+}
+
+/// A state bent and twisted at random, with slip and force if the rod shears.
+pub(crate) fn sample_of(seed: u64, edges: usize, options: RodOptions) -> Sample {
     let mut noise = Noise::new(seed);
-    let rod = Rod::with_derivatives(&curved(), MATERIAL, edges).unwrap();
+    let rod = Rod::with_options(&curved(), MATERIAL, edges, options, true).unwrap();
     let mut state = rod.rest_state();
     let mut a = Pose::rest(Vector3::new(-2.0, 1.0, 0.0));
     let mut b = Pose::rest(Vector3::new(22.0, 9.0, 1.0));
@@ -93,13 +114,14 @@ pub(crate) fn difference(f: impl Fn(f64) -> f64, h: f64) -> (f64, f64) {
 }
 
 /// Whole gradient and Hessian on (internal, link) coordinates.
-fn dense(system: &RodSystem) -> (DVector<f64>, DMatrix<f64>) {
-    let n = system.internal_gradient().len();
+pub(crate) fn dense(system: &RodSystem) -> (DVector<f64>, DMatrix<f64>) {
+    let band = system.internal_gradient().len();
+    let n = band + if system.shear.is_some() { 6 } else { 0 };
     let mut g = DVector::zeros(n + 12);
     let mut h = DMatrix::zeros(n + 12, n + 12);
-    for i in 0..n {
+    for i in 0..band {
         g[i] = system.internal_gradient()[i];
-        for d in 0..=10.min(n - 1 - i) {
+        for d in 0..=10.min(band - 1 - i) {
             let v = system.band[assemble::FIRST_INTERNAL + i][d];
             h[(i + d, i)] = v;
             h[(i, i + d)] = v;
@@ -107,7 +129,7 @@ fn dense(system: &RodSystem) -> (DVector<f64>, DMatrix<f64>) {
     }
     for end in 0..2 {
         let c = system.coupling(end);
-        let first = if end == 0 { 0 } else { n - 8 };
+        let first = if end == 0 { 0 } else { band - 8 };
         for i in 0..8 {
             for j in 0..6 {
                 h[(first + i, n + 6 * end + j)] = c[(i, j)];
@@ -117,17 +139,20 @@ fn dense(system: &RodSystem) -> (DVector<f64>, DMatrix<f64>) {
     }
     g.rows_mut(n, 12).copy_from(system.link_gradient());
     h.view_mut((n, n), (12, 12)).copy_from(&system.link_hessian);
+    if system.shear.is_some() {
+        system.dense_shear(band, &mut g, &mut h);
+    }
     (g, h)
 }
 
 #[test]
 fn gradient_and_hessian_match_differences() {
     for seed in 0..4 {
-        let sample = random_sample(seed, 8);
+        let sample = sample_of(seed, 8, kinds()[seed as usize]);
         let mut system = RodSystem::new(&sample.rod);
         system.assemble(&sample.rod, &sample.state, &sample.a, &sample.b);
         let (g, h) = dense(&system);
-        assert!((system.energy() - sample.rod.energy(&sample.state)).abs() < 1e-12 * system.energy());
+        assert!((system.energy() - sample.rod.energy(&sample.state)).abs() < 1e-12 * system.energy().abs());
         let n = g.len();
         let unit = |i: usize| DVector::from_fn(n, |r, _| if r == i { 1.0 } else { 0.0 });
         let step = 4e-3;
@@ -156,7 +181,11 @@ fn gradient_and_hessian_match_differences() {
 
 #[test]
 fn condensation_matches_dense() {
-    let sample = random_sample(7, 9);
+    kinds().into_iter().for_each(condensation_of);
+}
+
+fn condensation_of(options: RodOptions) {
+    let sample = sample_of(7, 9, options);
     let mut system = RodSystem::new(&sample.rod);
     system.assemble(&sample.rod, &sample.state, &sample.a, &sample.b);
     let (g, h) = dense(&system);
@@ -166,7 +195,9 @@ fn condensation_matches_dense() {
     let n = g.len() - 12;
     let inner = h.view((0, 0), (n, n)).into_owned();
     let eigen = inner.symmetric_eigenvalues();
-    assert_eq!(report.negative_pivots, eigen.iter().filter(|&&e| e < 0.0).count());
+    // The force of a rod with shear is a multiplier: three negative eigenvalues more.
+    let multipliers = if system.shear.is_some() { 3 } else { 0 };
+    assert_eq!(report.negative_pivots + multipliers, eigen.iter().filter(|&&e| e < 0.0).count());
     let inverse = inner.try_inverse().unwrap();
     let c = h.view((0, n), (n, 12)).into_owned();
     let want_h = h.view((n, n), (12, 12)) - c.tr_mul(&(&inverse * &c));
@@ -198,14 +229,15 @@ fn shift_makes_positive_definite() {
 
 #[test]
 fn rest_state_is_stress_free() {
-    for edges in [6, 7, 20, 55] {
-        let rod = Rod::new(&curved(), MATERIAL, edges).unwrap();
+    for (edges, options) in [6, 7, 20, 55].into_iter().zip(kinds()) {
+        let rod = Rod::with_options(&curved(), MATERIAL, edges, options, false).unwrap();
         let mut system = RodSystem::new(&rod);
         let mut state = rod.rest_state();
         let (a, b) = (Pose::rest(Vector3::x()), Pose::rest(Vector3::y()));
         rod.set_clamps(&mut state, &a, &b);
         system.assemble(&rod, &state, &a, &b);
-        assert_eq!(system.factor().negative_pivots, 0);
+        let report = system.factor();
+        assert!(report.negative_pivots == 0 && report.shift == 0.0, "{report:?}");
         let g = *system.condense().0;
         let floor = system.rounding_floor(&rod, &state);
         assert!(g.norm() < 10.0 * floor, "{} {}", g.norm(), floor);
@@ -216,7 +248,11 @@ fn rest_state_is_stress_free() {
 
 #[test]
 fn energy_is_invariant_under_rigid_motion() {
-    let sample = random_sample(11, 12);
+    kinds().into_iter().for_each(invariance_of);
+}
+
+fn invariance_of(options: RodOptions) {
+    let sample = sample_of(11, 12, options);
     let energy = sample.rod.energy(&sample.state);
     let rotation = exp_so3(&Vector3::new(1.1, -2.0, 0.4));
     let mut moved = sample.state.clone();
@@ -226,7 +262,8 @@ fn energy_is_invariant_under_rigid_motion() {
     for m in &mut moved.m1 {
         *m = rotation * *m;
     }
-    assert!((sample.rod.energy(&moved) - energy).abs() < 1e-11 * energy);
+    (moved.slip, moved.force) = (rotation * moved.slip, rotation * moved.force);
+    assert!((sample.rod.energy(&moved) - energy).abs() < 1e-11 * energy.abs());
     // And to second order: rigid motions of the condensed system do no work at first order.
     let mut system = RodSystem::new(&sample.rod);
     system.assemble(&sample.rod, &sample.state, &sample.a, &sample.b);
@@ -242,7 +279,14 @@ fn energy_is_invariant_under_rigid_motion() {
 #[ignore = "a measurement"]
 fn time_per_edge() {
     let edges = 40;
-    let Sample { rod, state, a, b } = random_sample(2, edges);
+    for (name, options) in ["plain", "rectangle", "corrected"].into_iter().zip(kinds()) {
+        println!("{name}:");
+        time_of(edges, options);
+    }
+}
+
+fn time_of(edges: usize, options: RodOptions) {
+    let Sample { rod, state, a, b } = sample_of(2, edges, options);
     let mut system = RodSystem::new(&rod);
     let report = |name: &str, rounds: u32, run: &mut dyn FnMut()| {
         let start = std::time::Instant::now();
@@ -271,6 +315,8 @@ fn time_per_edge() {
     });
     let strains = system.strains(&rod);
     report("stresses", 2_000, &mut || drop(std::hint::black_box(rod.stresses(&strains))));
-    report("Rod::new", 2_000, &mut || drop(Rod::new(&curved(), MATERIAL, edges)));
-    report("Rod::with_derivatives", 500, &mut || drop(Rod::with_derivatives(&curved(), MATERIAL, edges)));
+    report("Rod::new", 2_000, &mut || drop(Rod::with_options(&curved(), MATERIAL, edges, options, false)));
+    report("Rod::with_derivatives", 500, &mut || {
+        drop(Rod::with_options(&curved(), MATERIAL, edges, options, true));
+    });
 }

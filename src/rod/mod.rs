@@ -48,12 +48,14 @@ mod assemble;
 mod condense;
 #[cfg(test)]
 mod derivative_tests;
+mod options;
 mod rest;
 mod section;
 mod sensitivity;
 #[cfg(test)]
 mod sensitivity_tests;
 mod shape;
+mod shear;
 pub mod single;
 mod state;
 mod stencil;
@@ -61,8 +63,9 @@ mod stress;
 
 pub use assemble::RodSystem;
 pub use condense::FactorReport;
+pub use options::{Corrections, RestFrames, RodModel, RodOptions};
 pub use rest::{MIN_EDGES, PARAMETERS, RodError, RodParameters};
-pub use section::{RodMaterial, Stiffness, ellipse_stiffness};
+pub use section::{RodMaterial, SectionShape, Stiffness, ellipse_stiffness, rectangle_stiffness};
 pub use sensitivity::{ParameterMatrix, SensitivityError};
 pub use shape::{LARGEST_CURVATURE, LEAST_SLENDERNESS, LEAST_SPEED};
 pub use state::{RetractError, RodState};
@@ -79,6 +82,7 @@ use rest::{RestShape, rest_shape};
 pub struct Rod {
     parameters: RodParameters,
     material: RodMaterial,
+    options: RodOptions,
     edges: usize,
     length: f64,
     rest: RodState,
@@ -94,8 +98,12 @@ pub struct Rod {
     rest_measures: Vec<[f64; 3]>,
     /// EI₁/l̄, EI₂/l̄, GJ/l̄ per vertex (entry 0 unused), N·mm.
     vertex_stiffness: Vec<[f64; 3]>,
-    /// Semi-axes (a, b) per edge, mm.
+    /// Half widths (a, b) per edge, mm.
     sections: Vec<[f64; 2]>,
+    /// Shear compliance per edge, mm/N; empty without shear.
+    shear: Vec<f64>,
+    /// Of a rectangle, γ² per twist rate at the boundary points with its derivatives by a and b.
+    torsion: Option<Box<[[f64; 3]; SECTION_POINTS]>>,
     derivatives: Option<Box<RestShape<Dual<PARAMETERS>>>>,
 }
 
@@ -106,12 +114,12 @@ fn stretch_factor(j: usize, n: usize) -> f64 {
 }
 
 impl Rod {
-    /// A rod of elliptic section with `edges` edges.
+    /// A plain rod of elliptic section with `edges` edges.
     ///
     /// # Errors
     /// When the rest shape cannot be built: see [`RodError`].
     pub fn new(q: &RodParameters, material: RodMaterial, edges: usize) -> Result<Self, RodError> {
-        Self::build(q, material, edges, None)
+        Self::with_options(q, material, edges, RodOptions::default(), false)
     }
 
     /// As [`Self::new`], with the derivatives of the rest shape that the sensitivities need.
@@ -123,15 +131,31 @@ impl Rod {
         material: RodMaterial,
         edges: usize,
     ) -> Result<Self, RodError> {
-        let mut rod = Self::build(q, material, edges, None)?;
-        let plain = q.to_array();
-        let dual: [Dual<PARAMETERS>; PARAMETERS] = std::array::from_fn(|i| Dual::variable(plain[i], i));
-        rod.derivatives = Some(Box::new(rest_shape(&dual, &material, edges, None)?));
+        Self::with_options(q, material, edges, RodOptions::default(), true)
+    }
+
+    /// A rod of any section, frames and theory, with the derivatives of its rest shape if wanted.
+    ///
+    /// # Errors
+    /// See [`RodError`].
+    pub fn with_options(
+        q: &RodParameters,
+        material: RodMaterial,
+        edges: usize,
+        options: RodOptions,
+        derivatives: bool,
+    ) -> Result<Self, RodError> {
+        let mut rod = Self::build(q, material, edges, options, None)?;
+        if derivatives {
+            let plain = q.to_array();
+            let dual: [Dual<PARAMETERS>; PARAMETERS] = std::array::from_fn(|i| Dual::variable(plain[i], i));
+            rod.derivatives = Some(Box::new(rest_shape(&dual, &material, edges, &options, None)?));
+        }
         Ok(rod)
     }
 
-    /// A rod with section stiffnesses given instead of computed from a and b (which then only serve the
-    /// stresses). It has no derivatives by its parameters.
+    /// A plain rod with section stiffnesses given instead of computed from a and b (which then only serve
+    /// the stresses). It has no derivatives by its parameters.
     ///
     /// # Errors
     /// See [`RodError`].
@@ -141,16 +165,19 @@ impl Rod {
         edges: usize,
         stiffness: Stiffness,
     ) -> Result<Self, RodError> {
-        Self::build(q, material, edges, Some(stiffness))
+        Self::build(q, material, edges, RodOptions::default(), Some(stiffness))
     }
 
     fn build(
         q: &RodParameters,
         material: RodMaterial,
         edges: usize,
+        options: RodOptions,
         stiffness: Option<Stiffness>,
     ) -> Result<Self, RodError> {
-        let shape = rest_shape::<f64>(&q.to_array(), &material, edges, stiffness)?;
+        let shape = rest_shape::<f64>(&q.to_array(), &material, edges, &options, stiffness)?;
+        let torsion = (options.section == SectionShape::Rectangle)
+            .then(|| Box::new(section::rectangle_shear_forms(q.a, q.b)));
         let vertex_stiffness = (0..edges)
             .map(|i| {
                 if i == 0 {
@@ -165,11 +192,14 @@ impl Rod {
         Ok(Self {
             parameters: *q,
             material,
+            options,
             edges,
             length: shape.length,
             rest: RodState {
                 vertices: shape.vertices.iter().map(|v| Vector3::from(*v)).collect(),
                 m1: shape.m1.iter().map(|v| Vector3::from(*v)).collect(),
+                slip: Vector3::zeros(),
+                force: Vector3::zeros(),
             },
             stretch_lengths,
             ea: shape.stiffness.iter().map(|s| s.ea).collect(),
@@ -178,6 +208,8 @@ impl Rod {
             rest_measures: shape.measures,
             vertex_stiffness,
             sections: shape.sections,
+            shear: shape.shear,
+            torsion,
             derivatives: None,
         })
     }
@@ -197,8 +229,19 @@ impl Rod {
         self.edges
     }
 
-    /// Number of internal freedoms, 4N − 11.
+    /// Section, rest frames and corrections.
+    pub fn options(&self) -> &RodOptions {
+        &self.options
+    }
+
+    /// Number of internal freedoms: 4N − 11, and with shear six more at the end, the increments of
+    /// [`RodState::slip`] and [`RodState::force`].
     pub fn internal_freedoms(&self) -> usize {
+        self.band_freedoms() + if self.shear.is_empty() { 0 } else { shear::FREEDOMS }
+    }
+
+    /// Those in the band, θ₁, x₂, …
+    fn band_freedoms(&self) -> usize {
         4 * self.edges - 11
     }
 

@@ -4,7 +4,8 @@
 //! which is the implicit function theorem). Megaro et al. 2017, sec. 3.1; discretisation of Bergou et al.
 //! 2008 and 2010.
 
-use super::section::{RodMaterial, Stiffness, ellipse_stiffness};
+use super::options::{RestFrames, RodOptions};
+use super::section::{RodMaterial, Stiffness};
 use crate::math::dual::Real;
 use nalgebra::Vector3;
 use std::fmt;
@@ -38,12 +39,12 @@ pub struct RodParameters {
     pub position_b: Vector3<f64>,
     /// Hermite derivative dP/du at u = 1.
     pub derivative_b: Vector3<f64>,
-    /// Joint axis (any length): m₂ is its projection normal to each rest edge. For a round wire any
-    /// direction well off its tangents serves: rest curvature and twist follow the frame chosen.
+    /// Joint axis (any length): m₂ is its projection normal to each rest edge, or with
+    /// [`RestFrames::Transport`] to the first.
     pub axis: Vector3<f64>,
-    /// Semi-axis along m₁ (thin), mm.
+    /// Half width along m₁ (thin; of an ellipse the semi-axis), mm.
     pub a: f64,
-    /// Semi-axis along m₂ (wide), mm.
+    /// Half width along m₂ (wide), mm.
     pub b: f64,
 }
 
@@ -165,8 +166,11 @@ pub(crate) struct RestShape<T> {
     pub measures: Vec<[T; 3]>,
     /// Section stiffnesses per edge.
     pub stiffness: Vec<Stiffness<T>>,
-    /// Semi-axes (a, b) per edge.
+    /// Half widths (a, b) per edge.
     pub sections: Vec<[T; 2]>,
+    /// Shear compliance per edge, mm/N: its length between the attachment planes over k_s G A. Empty
+    /// without shear.
+    pub shear: Vec<T>,
 }
 
 /// A cubic Hermite curve.
@@ -251,11 +255,12 @@ fn invert(curve: &Hermite<f64>, s: &[f64; PANELS + 1], target: f64) -> (usize, f
     (panel, u)
 }
 
-/// Builds the rest shape with the section an ellipse, or `stiffness` if given (then constant).
+/// Builds the rest shape with the stiffnesses of its section, or `stiffness` if given (then constant).
 pub(crate) fn rest_shape<T: Real>(
     q: &[T; PARAMETERS],
     material: &RodMaterial,
     edges: usize,
+    options: &RodOptions,
     stiffness: Option<Stiffness>,
 ) -> Result<RestShape<T>, RodError> {
     if edges < MIN_EDGES {
@@ -312,13 +317,15 @@ pub(crate) fn rest_shape<T: Real>(
         let e = axpy(&x[1], T::constant(-1.0), &x[0]);
         let l = norm(&e);
         let t = e.map(|c| c / l);
-        let across = axpy(&axis, -dot(&axis, &t), &t);
-        let sine = norm(&across);
-        if sine.value().is_nan() || sine.value() < MIN_AXIS_SINE {
-            return Err(RodError::AxisParallel { edge: j });
-        }
-        let m2 = across.map(|c| c / sine);
-        frames.push([cross(&m2, &t), m2, t]);
+        let frame = match (options.frames, frames.last()) {
+            (RestFrames::Axis, _) => project(&axis, &t).ok_or(RodError::AxisParallel { edge: j })?,
+            (RestFrames::Transport, None) => project(&axis, &t).unwrap_or_else(|| any_frame(&t)),
+            (RestFrames::Transport, Some(last)) => {
+                let folded = RodError::DegenerateCurve { u: j as f64 / n as f64, relative_speed: 0.0 };
+                transport(last, &t).ok_or(folded)?
+            }
+        };
+        frames.push(frame);
         edge_lengths.push(l);
     }
     let zero = T::constant(0.0);
@@ -335,8 +342,24 @@ pub(crate) fn rest_shape<T: Real>(
             ei2: T::constant(s.ei2),
             gj: T::constant(s.gj),
         },
-        None => ellipse_stiffness(q[15], q[16], material),
+        None => {
+            let s = options.section.stiffness(q[15], q[16], material);
+            if options.corrections.width || options.corrections.warping {
+                let f = options.factors(q[15], q[16], length, material.nu);
+                Stiffness { ea: s.ea, ei1: s.ei1 * f[0], ei2: s.ei2 * f[1], gj: s.gj * f[2] }
+            } else {
+                s
+            }
+        }
     };
+    let mut shear = Vec::new();
+    if options.corrections.shear {
+        let ga =
+            section.ea.scale(options.section.shear_factor() * material.shear_modulus_mpa() / material.e_mpa);
+        // The clamped edges lie half between the attachment planes.
+        let part = |j: usize| if j == 0 || j == n - 1 { 0.5 } else { 1.0 };
+        shear.extend(edge_lengths.iter().enumerate().map(|(j, l)| l.scale(part(j)) / ga));
+    }
     Ok(RestShape {
         length,
         m1: frames.iter().map(|f| f[0]).collect(),
@@ -346,7 +369,42 @@ pub(crate) fn rest_shape<T: Real>(
         measures,
         stiffness: vec![section; n],
         sections: vec![[q[15], q[16]]; n],
+        shear,
     })
+}
+
+/// Frame (m₁, m₂, t) with m₂ the projection of a unit `axis`, unless that is nearly parallel.
+fn project<T: Real>(axis: &V<T>, t: &V<T>) -> Option<[V<T>; 3]> {
+    let across = axpy(axis, -dot(axis, t), t);
+    let sine = norm(&across);
+    if sine.value().is_nan() || sine.value() < MIN_AXIS_SINE {
+        return None;
+    }
+    let m2 = across.map(|c| c / sine);
+    Some([cross(&m2, t), m2, *t])
+}
+
+/// Some frame of `t`: m₂ as near as can be to the coordinate axis that is least along it.
+fn any_frame<T: Real>(t: &V<T>) -> [V<T>; 3] {
+    let least = (0..3).min_by(|&i, &j| t[i].value().abs().total_cmp(&t[j].value().abs())).unwrap_or(0);
+    let axis: V<T> = std::array::from_fn(|i| T::constant(if i == least { 1.0 } else { 0.0 }));
+    let m2 = unit(&axpy(&axis, -t[least], t));
+    [cross(&m2, t), m2, *t]
+}
+
+/// The frame carried to direction `t` by the least rotation; none for a fold.
+fn transport<T: Real>(from: &[V<T>; 3], t: &V<T>) -> Option<[V<T>; 3]> {
+    let chi = T::constant(1.0) + dot(&from[2], t);
+    if chi.value().is_nan() || chi.value() < MIN_AXIS_SINE {
+        return None;
+    }
+    let axis = cross(&from[2], t);
+    let v = &from[0];
+    let (once, one) = (cross(&axis, v), T::constant(1.0));
+    let carried = axpy(&axpy(v, one, &once), one / chi, &cross(&axis, &once));
+    // Rounding would add up along the rod.
+    let m1 = unit(&axpy(&carried, -dot(&carried, t), t));
+    Some([m1, cross(t, &m1), *t])
 }
 
 /// Integrated curvatures κ₁, κ₂ and twist τ between two frames (m₁, m₂, t). With k = 2 t₀×t₁/(1 + t₀·t₁):
@@ -372,7 +430,7 @@ mod tests {
     fn vertices_are_at_equal_arc_length() {
         let q = curved();
         let edges = 12;
-        let shape = rest_shape::<f64>(&q.to_array(), &MATERIAL, edges, None).unwrap();
+        let shape = rest_shape::<f64>(&q.to_array(), &MATERIAL, edges, &RodOptions::default(), None).unwrap();
         let curve = Hermite {
             p: [q.position_a, q.derivative_a, q.position_b, q.derivative_b].map(|v| [v.x, v.y, v.z]),
         };

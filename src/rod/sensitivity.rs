@@ -8,15 +8,18 @@
 
 use super::assemble::{END_COUPLING, FIRST_INTERNAL, RodSystem, end_coordinates, slot_signs};
 use super::rest::RestShape;
+use super::shear::{FREEDOMS, SlipDirections};
 use super::{PARAMETERS, Rod, stretch_factor};
 use crate::math::dual::Dual;
 use crate::math::{Pose, banded::HALF_BANDWIDTH};
 use nalgebra::{DMatrix, SMatrix, SVector, Vector3};
 
-/// Width of the joint solve: 12 link columns, 17 parameters, padding.
+/// Width of the joint solve: 12 link columns, 17 parameters, 3 for the force of rods with shear.
 pub(crate) const WIDTH: usize = 32;
 /// First parameter column.
 pub(crate) const FIRST_PARAMETER: usize = 12;
+/// First column of the force.
+const FIRST_FORCE: usize = FIRST_PARAMETER + PARAMETERS;
 
 /// 12 by 17: condensed columns.
 pub type ParameterMatrix = SMatrix<f64, 12, PARAMETERS>;
@@ -25,8 +28,10 @@ pub type ParameterMatrix = SMatrix<f64, 12, PARAMETERS>;
 #[derive(Clone, Debug)]
 pub(crate) struct ParameterColumns {
     condensed: ParameterMatrix,
-    /// K⁻¹ [C, g_int,q], one row per internal freedom.
+    /// K⁻¹ [C, g_int,q], one row per internal freedom, slip and force included.
     pub(crate) solved: Vec<[f64; WIDTH]>,
+    /// Derivatives of slip and force.
+    pub(crate) slip: Option<Box<SlipDirections>>,
     /// Derivatives by q of the coordinates (x, θ, e) each end carries.
     pub(crate) ends: [SMatrix<f64, 7, PARAMETERS>; 2],
 }
@@ -91,7 +96,12 @@ impl RodSystem {
         let internal = self.factors.order();
         let mut solved = vec![[0.0; WIDTH]; internal + HALF_BANDWIDTH];
         for (row, g) in solved.iter_mut().zip(&explicit[FIRST_INTERNAL..4 * n - 4]) {
-            row[FIRST_PARAMETER..FIRST_PARAMETER + PARAMETERS].copy_from_slice(g);
+            row[FIRST_PARAMETER..FIRST_FORCE].copy_from_slice(g);
+        }
+        if let Some(shear) = &self.shear {
+            for (row, g) in solved.iter_mut().zip(&shear.columns[FIRST_INTERNAL..4 * n - 4]) {
+                row[FIRST_FORCE..].copy_from_slice(g);
+            }
         }
         let mut condensed = ParameterMatrix::zeros();
         let mut couplings = [SMatrix::<f64, END_COUPLING, 6>::zeros(); 2];
@@ -123,7 +133,22 @@ impl RodSystem {
                 }
             }
         }
-        let columns = self.columns.insert(Box::new(ParameterColumns { condensed, solved, ends }));
+        let slip = self.shear.as_deref().and_then(|shear| {
+            let mut by_force = self.force_parameter_columns(rest, &ends);
+            for (row, g) in solved.iter().zip(&shear.columns[FIRST_INTERNAL..4 * n - 4]) {
+                for (k, g) in g.iter().enumerate() {
+                    for c in 0..PARAMETERS {
+                        by_force[(k, c)] -= g * row[FIRST_PARAMETER + c];
+                    }
+                }
+            }
+            self.condense_parameters(&mut condensed, &by_force)
+        });
+        if let Some(slip) = &slip {
+            through_slip(&mut solved, slip);
+        }
+        let slip = slip.map(Box::new);
+        let columns = self.columns.insert(Box::new(ParameterColumns { condensed, solved, slip, ends }));
         Ok(&columns.condensed)
     }
 
@@ -133,7 +158,7 @@ impl RodSystem {
     }
 
     /// Sensitivity of the internal freedoms, −K⁻¹(C dz + g_q dq): `d_link` is 12 by n, `dq` 17 by n, the
-    /// result (4N − 11) by n, in the chart of [`Rod::retract`].
+    /// result has one row per internal freedom, in the chart of [`Rod::retract`].
     ///
     /// # Errors
     /// Without parameter columns for this state, or with matrices of the wrong shape.
@@ -202,6 +227,13 @@ impl RodSystem {
             add_scaled(&mut local[2], scale * (l / l0.re - 1.0), &rest.stiffness[j].ea.eps);
             add_scaled(&mut local[2], -scale * rod.ea[j] * l / (l0.re * l0.re), &l0.eps);
         }
+        if let Some(shear) = &self.shear {
+            for ((local, f), c) in local.iter_mut().zip(&self.frames).zip(&rest.shear) {
+                let along = f.t.dot(&shear.force);
+                add_scaled(&mut local[0], along * f.m1.dot(&shear.force), &c.eps);
+                add_scaled(&mut local[1], along * f.m2.dot(&shear.force), &c.eps);
+            }
+        }
         for i in 1..n {
             let measures = &self.measures[i];
             let (s0, s1, v) = (&rest.stiffness[i - 1], &rest.stiffness[i], rest.voronoi[i]);
@@ -258,6 +290,23 @@ impl RodSystem {
             column += moment;
         }
         out
+    }
+}
+
+/// From K⁻¹ of all columns at fixed slip and force to derivatives with these following: link B's chain moves
+/// by du_B − dD, and the force acts by its own columns. Slip and force become rows of their own.
+fn through_slip(solved: &mut Vec<[f64; WIDTH]>, slip: &SlipDirections) {
+    for row in solved.iter_mut() {
+        let old = *row;
+        for (c, to) in row.iter_mut().enumerate().take(FIRST_FORCE) {
+            for k in 0..3 {
+                *to += old[FIRST_FORCE + k] * slip[(3 + k, c)] - old[6 + k] * slip[(k, c)];
+            }
+        }
+        row[FIRST_FORCE..].fill(0.0);
+    }
+    for k in 0..FREEDOMS {
+        solved.push(std::array::from_fn(|c| if c < FIRST_FORCE { -slip[(k, c)] } else { 0.0 }));
     }
 }
 

@@ -1,6 +1,6 @@
 //! Parameter columns, equilibrium sensitivities and stress derivatives against differences.
 
-use super::derivative_tests::{MATERIAL, curved, difference, random_sample};
+use super::derivative_tests::{MATERIAL, curved, dense, difference, kinds, sample_of};
 use super::single::{EndLoad, SingleRod};
 use super::*;
 use nalgebra::{DMatrix, DVector, SMatrix};
@@ -18,7 +18,11 @@ fn shifted(q: &RodParameters, k: usize, s: f64) -> RodParameters {
 
 #[test]
 fn parameter_columns_match_differences() {
-    let sample = random_sample(5, 8);
+    kinds().into_iter().for_each(parameter_columns_of);
+}
+
+fn parameter_columns_of(options: RodOptions) {
+    let sample = sample_of(5, 8, options);
     let mut system = RodSystem::new(&sample.rod);
     system.assemble(&sample.rod, &sample.state, &sample.a, &sample.b);
     system.factor_unshifted();
@@ -28,7 +32,7 @@ fn parameter_columns_match_differences() {
     let p = -system.internal_sensitivity(&DMatrix::zeros(12, 17), &DMatrix::identity(17, 17)).unwrap();
     let q0 = curved();
     let energy = |k: usize, dq: f64, i: usize, d: f64| {
-        let rod = Rod::new(&shifted(&q0, k, dq), MATERIAL, 8).unwrap();
+        let rod = Rod::with_options(&shifted(&q0, k, dq), MATERIAL, 8, options, false).unwrap();
         let mut all = DVector::zeros(n + 12);
         all[i] = d;
         let v = |i: usize| Vector3::new(all[n + i], all[n + i + 1], all[n + i + 2]);
@@ -49,21 +53,10 @@ fn parameter_columns_match_differences() {
             columns[(i, k)] = 0.5 * (both - own_q - own_d) / (dq * di);
         }
     }
-    let (mut inner, mut coupling) = (DMatrix::zeros(n, n), DMatrix::zeros(n, 12));
-    for i in 0..n {
-        for d in 0..=10.min(n - 1 - i) {
-            let v = system.band[assemble::FIRST_INTERNAL + i][d];
-            inner[(i + d, i)] = v;
-            inner[(i, i + d)] = v;
-        }
-    }
-    for end in 0..2 {
-        coupling
-            .view_mut((if end == 0 { 0 } else { n - 8 }, 6 * end), (8, 6))
-            .copy_from(&system.coupling(end));
-    }
+    let (_, h) = dense(&system);
+    let (inner, coupling) = (h.view((0, 0), (n, n)), h.view((0, n), (n, 12)));
+    let got_internal = inner * &p;
     let want_internal = columns.rows(0, n);
-    let got_internal = &inner * &p;
     let got_link = DMatrix::from_fn(12, 17, |i, j| condensed[(i, j)]) + coupling.transpose() * &p;
     let want_link = columns.rows(n, 12);
     for k in 0..17 {
@@ -80,8 +73,8 @@ fn parameter_columns_match_differences() {
     assert!((0..17).all(|k| (pulled[k] - want[k]).abs() < 1e-9 * want.amax()));
 }
 
-fn clamped(q: &RodParameters) -> SingleRod {
-    let rod = Rod::with_derivatives(q, MATERIAL, 20).unwrap();
+fn clamped(q: &RodParameters, options: RodOptions) -> SingleRod {
+    let rod = Rod::with_options(q, MATERIAL, 20, options, true).unwrap();
     let mut s = SingleRod::new(rod, Vector3::zeros(), Vector3::new(19.0, 7.0, 3.0));
     for _ in 0..4 {
         s.move_b(&Vector3::new(-0.4, 0.5, 0.2), &Vector3::new(0.04, -0.03, 0.12)).unwrap();
@@ -95,8 +88,8 @@ const LOAD: EndLoad = EndLoad {
     moment: Vector3::new(0.0, 0.0, 0.0),
 };
 
-fn cantilever(q: &RodParameters) -> SingleRod {
-    let rod = Rod::with_derivatives(q, MATERIAL, 20).unwrap();
+fn cantilever(q: &RodParameters, options: RodOptions) -> SingleRod {
+    let rod = Rod::with_options(q, MATERIAL, 20, options, true).unwrap();
     let mut s = SingleRod::new(rod, Vector3::zeros(), Vector3::new(19.0, 7.0, 3.0));
     for k in 1..=4 {
         let part = EndLoad { force: LOAD.force * 0.25 * f64::from(k), ..LOAD };
@@ -183,12 +176,12 @@ fn check(build: impl Fn(&RodParameters) -> SingleRod, free: bool) {
 
 #[test]
 fn clamped_sensitivities_match_resolving() {
-    check(clamped, false);
+    kinds().into_iter().for_each(|options| check(|q| clamped(q, options), false));
 }
 
 #[test]
 fn cantilever_sensitivities_match_resolving() {
-    check(cantilever, true);
+    kinds().into_iter().for_each(|options| check(|q| cantilever(q, options), true));
 }
 
 /// Axial strain over the section must give back the bending energy, and the inside of a bend be compressed.

@@ -3,6 +3,7 @@
 //! energy has no memory of the way taken (Bergou et al. 2010, time-parallel frames).
 
 use super::Rod;
+use super::shear::FREEDOMS;
 use super::stencil::EdgeFrame;
 use crate::math::Pose;
 use nalgebra::Vector3;
@@ -16,6 +17,11 @@ pub struct RodState {
     pub vertices: Vec<Vector3<f64>>,
     /// N unit vectors m₁ normal to their edge; m₂ = t × m₁.
     pub m1: Vec<Vector3<f64>>,
+    /// With shear, the sum of all shear displacements, mm: the vertices leave them out, and those of link
+    /// B lie this much short of the link.
+    pub slip: Vector3<f64>,
+    /// With shear, the force link B exerts on the rod, N.
+    pub force: Vector3<f64>,
 }
 
 /// Why an increment was refused: it must be cut. The state is unchanged.
@@ -73,7 +79,8 @@ impl Rod {
 
     fn write_clamps(&self, state: &mut RodState, pose_a: &Pose, pose_b: &Pose) {
         let n = self.edges;
-        for (edge, pose) in [(0, pose_a), (n - 1, pose_b)] {
+        let pose_b = self.chain_pose(state, pose_b);
+        for (edge, pose) in [(0, pose_a), (n - 1, &pose_b)] {
             for k in [edge, edge + 1] {
                 state.vertices[k] = pose.point(&self.rest.vertices[k]);
             }
@@ -125,7 +132,18 @@ impl Rod {
         if increment.len() != self.internal_freedoms() {
             return Err(RetractError::Length);
         }
-        let poses = [pose_a, pose_b];
+        let mut chain_b = self.chain_pose(state, pose_b);
+        let (mut slip, mut force) = (state.slip, state.force);
+        if let Some(extra) = increment.get(self.band_freedoms()..).filter(|x| x.len() == FREEDOMS) {
+            let change = Vector3::from_column_slice(&extra[..3]);
+            chain_b.translation -= change;
+            slip += change;
+            force += Vector3::from_column_slice(&extra[3..]);
+            if !slip.iter().chain(force.iter()).all(|x| x.is_finite()) {
+                return Err(RetractError::EdgeTurn { edge: self.edges - 1 });
+            }
+        }
+        let poses = [pose_a, &chain_b];
         let mut previous: Option<EdgeFrame> = None;
         for j in 0..self.edges {
             let frame = self.moved(state, increment, poses, j).ok_or(RetractError::EdgeTurn { edge: j })?;
@@ -151,6 +169,7 @@ impl Rod {
                 state.vertices[j] += d;
             }
         }
+        (state.slip, state.force) = (slip, force);
         self.write_clamps(state, pose_a, pose_b);
         Ok(())
     }

@@ -1,18 +1,17 @@
-//! Strains and von Mises stresses of an elliptic rod, with total derivatives.
+//! Strains and von Mises stresses of a rod, with total derivatives.
 //!
 //! Megaro et al. 2017, eqs. 8–16, with three corrections: curvature is integrated curvature over the *rest*
 //! Voronoi length (it already contains the stretch of the centre line, which eq. 11 as printed would count
 //! twice), fibres are measured by their own rest length (1 − κ̄·c), and the attachment planes, where the
 //! largest stress sits but no vertex, are reached by linear extrapolation of the strain measures.
 //!
-//! ε_z(c) = (ε_cl − (κ − κ̄)·c)/(1 − κ̄·c), twist by St Venant's warping ψ = (b² − a²)/(a² + b²) xy, and
-//! σ_v² = (Eε_z)² + 3σ_s².
+//! ε_z(c) = (ε_cl − (κ − κ̄)·c)/(1 − κ̄·c), twist by St Venant's warping (of the ellipse ψ = (b² − a²)/(a² + b²) xy),
+//! and σ_v² = (Eε_z)² + 3σ_s². Transverse shear is left out: it vanishes where bending is largest.
 
 use super::assemble::{FIRST_INTERNAL, RodSystem, end_coordinates, slot_signs};
 use super::sensitivity::{FIRST_PARAMETER, SensitivityError, WIDTH};
 use super::{PARAMETERS, Rod, stretch_factor};
 use nalgebra::SVector;
-use std::f64::consts::TAU;
 
 /// Points round a section at which stress is evaluated; a multiple of four, so that both axes are hit.
 pub const SECTION_POINTS: usize = 32;
@@ -36,9 +35,9 @@ pub struct StationStrain {
     pub rest_kappa2: f64,
     /// Rest twist rate, rad/mm.
     pub rest_twist: f64,
-    /// Semi-axis along m₁, mm.
+    /// Half width along m₁, mm.
     pub a: f64,
-    /// Semi-axis along m₂, mm.
+    /// Half width along m₂, mm.
     pub b: f64,
 }
 
@@ -47,7 +46,7 @@ pub struct StationStrain {
 pub struct StressSample {
     /// Station: 0 and N are the attachment planes, 1..N the inner vertices.
     pub station: usize,
-    /// Point k at (a cos 2πk/32, b sin 2πk/32) along (m₁, m₂).
+    /// Point of the boundary: see [`SectionShape::boundary`](super::SectionShape::boundary).
     pub point: usize,
     /// von Mises stress, MPa.
     pub von_mises_mpa: f64,
@@ -81,7 +80,7 @@ impl StationStrain {
         (self.stretch - change) / (1.0 - self.rest_kappa1 * x - self.rest_kappa2 * y)
     }
 
-    /// Engineering shear strains (γ_xz, γ_yz) at (x, y), mm.
+    /// Engineering shear strains (γ_xz, γ_yz) of an elliptic section at (x, y), mm.
     pub fn shear_strains(&self, x: f64, y: f64) -> [f64; 2] {
         let rate = self.twist - self.rest_twist;
         let (a2, b2) = (self.a * self.a, self.b * self.b);
@@ -89,19 +88,26 @@ impl StationStrain {
         [-2.0 * a2 / (a2 + b2) * y * rate, 2.0 * b2 / (a2 + b2) * x * rate]
     }
 
-    /// Axial and von Mises stress at the section point (a cos φ, b sin φ), given (cos φ, sin φ).
-    fn stress(&self, (c, s): (f64, f64), e: f64, g: f64) -> (f64, f64) {
-        let (x, y) = (self.a * c, self.b * s);
+    /// Axial and von Mises stress at a boundary point.
+    fn stress(&self, point: &BoundaryPoint, e: f64, g: f64) -> (f64, f64) {
+        let (x, y) = (self.a * point.x, self.b * point.y);
         let axial = e * self.axial_strain(x, y);
-        let [gx, gy] = self.shear_strains(x, y);
-        (axial, (axial * axial + 3.0 * g * g * (gx * gx + gy * gy)).sqrt())
+        let square = match &point.shear {
+            None => {
+                let [gx, gy] = self.shear_strains(x, y);
+                gx * gx + gy * gy
+            }
+            Some([form, ..]) => form * (self.twist - self.rest_twist).powi(2),
+        };
+        (axial, (axial * axial + 3.0 * g * g * square).sqrt())
     }
 
     /// von Mises stress with its derivative by the nine station values (zero where it vanishes).
-    fn stress_gradient(&self, (c, s): (f64, f64), e: f64, g: f64) -> (f64, [f64; STATION_VALUES]) {
+    fn stress_gradient(&self, point: &BoundaryPoint, e: f64, g: f64) -> (f64, [f64; STATION_VALUES]) {
+        let (c, s) = (point.x, point.y);
         let (x, y) = (self.a * c, self.b * s);
         let fibre = 1.0 - self.rest_kappa1 * x - self.rest_kappa2 * y;
-        let (axial, mises) = self.stress((c, s), e, g);
+        let (axial, mises) = self.stress(point, e, g);
         let strain = axial / e;
         let mut d = [0.0; STATION_VALUES];
         if mises == 0.0 {
@@ -116,6 +122,15 @@ impl StationStrain {
         d[5] = w * y * (1.0 + strain);
         d[7] = w * c * (strain * self.rest_kappa1 - (self.kappa1 - self.rest_kappa1));
         d[8] = w * s * (strain * self.rest_kappa2 - (self.kappa2 - self.rest_kappa2));
+        if let Some([form, by_a, by_b]) = &point.shear {
+            let rate = self.twist - self.rest_twist;
+            let k = 3.0 * g * g * rate / mises;
+            d[3] = k * form;
+            d[6] = -d[3];
+            d[7] += 0.5 * k * rate * by_a;
+            d[8] += 0.5 * k * rate * by_b;
+            return (mises, d);
+        }
         // ½ d(3σ_s²)/σ_v, γ² = 4 rate² a²b² (a² s² + b² c²)/(a² + b²)².
         let rate = self.twist - self.rest_twist;
         let (a, b) = (self.a, self.b);
@@ -133,10 +148,13 @@ impl StationStrain {
     }
 }
 
-/// Cosine and sine of the angle of section point `k`.
-fn section_angle(k: usize) -> (f64, f64) {
-    let (s, c) = (TAU * k as f64 / SECTION_POINTS as f64).sin_cos();
-    (c, s)
+/// A point of a section's boundary.
+struct BoundaryPoint {
+    /// Position in half widths.
+    x: f64,
+    y: f64,
+    /// γ² per twist rate with its derivatives by a and b; of an ellipse in closed form.
+    shear: Option<[f64; 3]>,
 }
 
 /// Weights of the two nearest free edges in the stretch at inner vertex `i` of `n` edges. The strain of an
@@ -165,6 +183,12 @@ impl Rod {
         (0..=n).map(|k| 0.5 * (s[(k + 1).min(n)] - s[k.saturating_sub(1)]) / self.length).collect()
     }
 
+    fn boundary_point(&self, k: usize) -> BoundaryPoint {
+        let (x, y) = self.options.section.boundary(k);
+        let shear = self.torsion.as_deref().map(|forms| forms[k % SECTION_POINTS]);
+        BoundaryPoint { x, y, shear }
+    }
+
     /// von Mises and axial stress at point `point` of a section with these strains.
     pub fn stress_sample(
         &self,
@@ -173,15 +197,15 @@ impl Rod {
         point: usize,
     ) -> Option<StressSample> {
         let (e, g) = (self.material.e_mpa, self.material.shear_modulus_mpa());
-        let (axial, mises) = strains.get(station)?.stress(section_angle(point), e, g);
+        let (axial, mises) = strains.get(station)?.stress(&self.boundary_point(point), e, g);
         Some(StressSample { station, point, von_mises_mpa: mises, axial_mpa: axial })
     }
 
     /// von Mises stresses, MPa, at the [`SECTION_POINTS`] points of every station.
     pub fn stresses(&self, strains: &[StationStrain]) -> Vec<[f64; SECTION_POINTS]> {
         let (e, g) = (self.material.e_mpa, self.material.shear_modulus_mpa());
-        let angles: [(f64, f64); SECTION_POINTS] = std::array::from_fn(section_angle);
-        strains.iter().map(|s| angles.map(|angle| s.stress(angle, e, g).1)).collect()
+        let points: [BoundaryPoint; SECTION_POINTS] = std::array::from_fn(|k| self.boundary_point(k));
+        strains.iter().map(|s| std::array::from_fn(|k| s.stress(&points[k], e, g).1)).collect()
     }
 
     /// The largest von Mises stress; of equals the first.
@@ -243,7 +267,7 @@ impl RodSystem {
         let columns = self.columns.as_deref().ok_or(SensitivityError::NoColumns)?;
         let n = self.n;
         let mut full = vec![[0.0; WIDTH]; 4 * n + 3];
-        for (to, from) in full[FIRST_INTERNAL..].iter_mut().zip(&columns.solved) {
+        for (to, from) in full[FIRST_INTERNAL..4 * n - 4].iter_mut().zip(&columns.solved) {
             *to = from.map(|x| -x);
         }
         for end in 0..2 {
@@ -254,6 +278,15 @@ impl RodSystem {
                 }
                 for c in 0..PARAMETERS {
                     row[FIRST_PARAMETER + c] = columns.ends[end][(i, c)];
+                }
+                if let (1, Some(slip)) = (end, &columns.slip) {
+                    // Link B carries its end of the chain less the slip.
+                    let by_b: [f64; 3] = std::array::from_fn(|k| row[6 + k]);
+                    for (c, to) in row.iter_mut().enumerate().take(slip.ncols()) {
+                        for (k, d) in by_b.iter().enumerate() {
+                            *to -= d * slip[(k, c)];
+                        }
+                    }
                 }
                 full[at] = row;
             }
@@ -347,7 +380,7 @@ impl StrainJacobian {
     pub fn stress(&self, rod: &Rod, station: usize, point: usize) -> Option<(f64, RodDirections)> {
         let (strain, rows) = (self.strains.get(station)?, self.rows.get(station)?);
         let (e, g) = (rod.material.e_mpa, rod.material.shear_modulus_mpa());
-        let (mises, d) = strain.stress_gradient(section_angle(point), e, g);
+        let (mises, d) = strain.stress_gradient(&rod.boundary_point(point), e, g);
         let mut sum = [0.0; WIDTH];
         for (d, row) in d.into_iter().zip(rows) {
             add_scaled(&mut sum, d, row);
