@@ -303,6 +303,18 @@ pub enum ObjectiveKind {
         /// Stress that counts as one; none: SI (1 Pa).
         scale_mpa: Option<f64>,
     },
+    /// Soft maximum of von Mises stress (paper, eq. 16, made monotone).
+    Stress {
+        /// Stress that counts as one; none: SI (1 Pa).
+        scale_mpa: Option<f64>,
+    },
+    /// Soft maximum of the squared torque (paper, eq. 6, made monotone).
+    Torque {
+        /// Index into [`Design::drives`].
+        drive: usize,
+        /// Torque that counts as one: the motor's stall torque, or the scale in the text.
+        reference_n_mm: f64,
+    },
 }
 
 /// `require QUERY <= BOUND`.

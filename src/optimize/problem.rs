@@ -2,17 +2,20 @@
 
 use super::guards;
 use super::normal::Normal;
-use super::objectives::{self, Objective, StateView};
+use super::objectives::{self, Level, StateView, StatesSensitivity, Term};
 use crate::equilibrium::{Cycle, Layout, Model, SensitivityWorkspace, sweep};
 use crate::ir::Design;
 use rayon::prelude::*;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A design, its layout and its objective.
 pub struct Problem<'d> {
     design: &'d Design,
     layout: &'d Layout,
-    objectives: Vec<Box<dyn Objective>>,
+    objectives: Vec<Term>,
+    /// Largest sample of each soft maximum at the first point simulated: what its sharpness refers to.
+    references: OnceLock<Vec<f64>>,
     edges: usize,
     simulations: AtomicUsize,
 }
@@ -29,6 +32,8 @@ pub struct Trial<'d> {
     pub cost: f64,
     /// Contribution of each term, in the order of [`Problem::term_names`].
     pub terms: Vec<f64>,
+    /// Of each term that is a soft maximum.
+    levels: Vec<Option<Level>>,
 }
 
 impl Trial<'_> {
@@ -58,6 +63,7 @@ impl<'d> Problem<'d> {
             design,
             layout,
             objectives: objectives::build(design),
+            references: OnceLock::new(),
             edges,
             simulations: AtomicUsize::new(0),
         }
@@ -109,14 +115,34 @@ impl<'d> Problem<'d> {
         let p = self.to_parameters(x);
         let model = Model::new(self.design, self.layout, &p, self.edges, true).ok()?;
         let cycle = sweep(&model).ok()?;
-        let mut terms: Vec<f64> = self
-            .objectives
-            .iter()
-            .map(|o| (0..self.layout.counted_states()).map(|s| o.cost(&self.view(&model, &cycle, s))).sum())
-            .collect();
+        let views: Vec<StateView> =
+            (0..self.layout.counted_states()).map(|s| self.view(&model, &cycle, s)).collect();
+        let references = self.references.get_or_init(|| {
+            let largest = |o: &Term| match o {
+                Term::Sum(_) => 0.0,
+                Term::Peak(o) => Level::reference(o.as_ref(), &views),
+            };
+            self.objectives.iter().map(largest).collect()
+        });
+        let mut terms = Vec::with_capacity(self.objectives.len() + 1);
+        let mut levels = Vec::with_capacity(self.objectives.len());
+        for (o, reference) in self.objectives.iter().zip(references) {
+            match o {
+                Term::Sum(o) => {
+                    terms.push(views.iter().map(|view| o.cost(view)).sum());
+                    levels.push(None);
+                }
+                Term::Peak(o) => {
+                    let level = Level::new(o.as_ref(), &views, *reference);
+                    terms.push(o.weight() * level.value);
+                    levels.push(Some(level));
+                }
+            }
+        }
+        drop(views);
         terms.push(guards::cost(&model));
         let cost: f64 = terms.iter().sum();
-        cost.is_finite().then(|| Trial { x: x.to_vec(), model, cycle, cost, terms })
+        cost.is_finite().then(|| Trial { x: x.to_vec(), model, cycle, cost, terms, levels })
     }
 
     fn view<'a>(&self, model: &'a Model<'d>, cycle: &'a Cycle, state: usize) -> StateView<'a> {
@@ -133,7 +159,7 @@ impl<'d> Problem<'d> {
     /// result does not depend on the number of threads.
     pub fn differentiate(&self, trial: &Trial<'d>) -> Option<Normal> {
         let n = self.parameters();
-        let parts: Vec<Option<Normal>> = (0..self.layout.counted_states())
+        let parts: Vec<Option<Vec<Normal>>> = (0..self.layout.counted_states())
             .into_par_iter()
             .map_init(
                 || SensitivityWorkspace::new(&trial.model),
@@ -141,18 +167,29 @@ impl<'d> Problem<'d> {
                     let target: Vec<f64> =
                         self.layout.drives.iter().map(|d| d.values_rad[s] - d.rest_rad).collect();
                     let view = self.view(&trial.model, &trial.cycle, s);
-                    let sensitivity = workspace.at(&trial.model, view.equilibrium, &target).ok()?;
-                    let mut part = Normal::new(n);
-                    for o in &self.objectives {
-                        o.accumulate(&view, &sensitivity, &mut part);
-                    }
-                    Some(part)
+                    let free = workspace.at(&trial.model, view.equilibrium, &target).ok()?;
+                    Some(self.state_parts(trial, &view, &StatesSensitivity { free }))
                 },
             )
             .collect();
-        let mut sum = Normal::new(n);
+        // All sums together first, then each soft maximum.
+        let mut totals: Vec<Normal> = Vec::new();
         for part in parts {
-            sum.merge(&part?);
+            let part = part?;
+            totals.resize_with(part.len(), || Normal::new(n));
+            for (total, part) in totals.iter_mut().zip(&part) {
+                total.merge(part);
+            }
+        }
+        let mut totals = totals.into_iter();
+        let mut sum = totals.next()?;
+        let peaks = self.objectives.iter().zip(&trial.levels).filter_map(|(o, level)| match (o, level) {
+            (Term::Peak(o), Some(level)) => Some((o.weight(), level)),
+            _ => None,
+        });
+        for ((weight, level), mut total) in peaks.zip(totals) {
+            level.complete(weight, &mut total);
+            sum.merge(&total);
         }
         guards::accumulate(&trial.model, &mut sum);
         sum.complete();
@@ -163,5 +200,23 @@ impl<'d> Problem<'d> {
             sum.gauss_newton.column_mut(i).scale_mut(width);
         }
         Some(sum)
+    }
+
+    /// One state's contributions: that of all sums, then of each soft maximum.
+    fn state_parts(&self, trial: &Trial<'d>, view: &StateView, at: &StatesSensitivity) -> Vec<Normal> {
+        let n = self.parameters();
+        let mut parts = vec![Normal::new(n)];
+        for (o, level) in self.objectives.iter().zip(&trial.levels) {
+            match (o, level) {
+                (Term::Sum(o), _) => o.accumulate(view, at, &mut parts[0]),
+                (Term::Peak(o), Some(level)) => {
+                    let mut part = Normal::new(n);
+                    o.accumulate(view, at, level, &mut part);
+                    parts.push(part);
+                }
+                (Term::Peak(_), None) => {}
+            }
+        }
+        parts
     }
 }
