@@ -79,6 +79,11 @@ fn torque() {
 }
 
 #[test]
+fn sway() {
+    check_gradient(ObjectiveKind::Sway { trace: 0, force_n: 1.0, scale_mm: Some(0.5) });
+}
+
+#[test]
 fn stress() {
     check_gradient(ObjectiveKind::Stress { scale_mpa: Some(10.0) });
 }

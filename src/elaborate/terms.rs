@@ -10,13 +10,15 @@ use std::collections::BTreeMap;
 
 /// The paper's weights (section 5) for terms in SI units.
 const TRACK_WEIGHT: f64 = 1e5;
+const SWAY_WEIGHT: f64 = 5e5;
 const TORQUE_WEIGHT: f64 = 10.0;
 const STRESS_WEIGHT: f64 = 1e-6;
+/// Each force of `sway` where the text is silent (the paper's, section 5).
+const SWAY_FORCE_N: f64 = 1.0;
 
 /// Objectives and queries of the target language that this version does not have.
-const LATER_TERMS: &[&str] =
-    &["sway", "collision", "force", "gap", "buckling", "tension", "multistable", "mass"];
-const TERMS: &[&str] = &["track", "torque", "stress"];
+const LATER_TERMS: &[&str] = &["collision", "force", "gap", "buckling", "tension", "multistable", "mass"];
+const TERMS: &[&str] = &["track", "sway", "torque", "stress"];
 
 /// What terms may name.
 pub(super) struct Named<'n> {
@@ -46,6 +48,7 @@ impl<'a> Evaluator<'a> {
         };
         let (kind, default) = match function.node.as_str() {
             "track" => self.track(scope, function, arguments, named)?,
+            "sway" => self.sway(scope, function, arguments, named)?,
             "torque" => self.torque(scope, function, arguments, named)?,
             "stress" => self.stress(scope, function, arguments)?,
             name if LATER_TERMS.contains(&name) => return self.later(codes::LATER_TERM, name, function.at),
@@ -76,6 +79,22 @@ impl<'a> Evaluator<'a> {
         let scale_mm = self.positive(scope, slots.get(1).copied().flatten(), Dimension::LENGTH, "a scale")?;
         let default = if scale_mm.is_some() { 1.0 } else { TRACK_WEIGHT };
         Ok((ObjectiveKind::Track { trace: trace?, scale_mm }, default))
+    }
+
+    fn sway(
+        &mut self,
+        scope: usize,
+        function: &'a Ident,
+        arguments: &'a [Argument],
+        named: &Named,
+    ) -> Outcome<(ObjectiveKind, f64)> {
+        let slots = self.arguments(function, arguments, &["trace", "force", "scale"], 1)?;
+        let trace = self.trace_argument(scope, slots.first().copied().flatten(), named.traces);
+        let force_n = self.positive(scope, slots.get(1).copied().flatten(), Dimension::FORCE, "a force");
+        let scale_mm = self.positive(scope, slots.get(2).copied().flatten(), Dimension::LENGTH, "a scale")?;
+        let default = if scale_mm.is_some() { 1.0 } else { SWAY_WEIGHT };
+        let force_n = force_n?.unwrap_or(SWAY_FORCE_N);
+        Ok((ObjectiveKind::Sway { trace: trace?, force_n, scale_mm }, default))
     }
 
     fn torque(

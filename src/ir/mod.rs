@@ -296,6 +296,15 @@ pub enum ObjectiveKind {
         /// Length that counts as one; none: SI (1 m).
         scale_mm: Option<f64>,
     },
+    /// Displacement of a trace under forces normal to its path (paper, eq. 4).
+    Sway {
+        /// Index into [`Design::traces`].
+        trace: usize,
+        /// Size of each force.
+        force_n: f64,
+        /// Length that counts as one; none: SI (1 m).
+        scale_mm: Option<f64>,
+    },
     /// Squared excess of von Mises stress over a bound.
     StressBelow {
         /// The bound.

@@ -3,7 +3,9 @@
 use super::guards;
 use super::normal::Normal;
 use super::objectives::{self, Level, StateView, StatesSensitivity, Term};
-use crate::equilibrium::{Cycle, Layout, Model, SensitivityWorkspace, sweep};
+use crate::equilibrium::{
+    Cycle, Equilibrium, Layout, Model, PointForce, SensitivityWorkspace, Solver, sweep,
+};
 use crate::ir::Design;
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -14,6 +16,8 @@ pub struct Problem<'d> {
     design: &'d Design,
     layout: &'d Layout,
     objectives: Vec<Term>,
+    /// Per load case one force a state.
+    cases: Vec<Vec<PointForce>>,
     /// Largest sample of each soft maximum at the first point simulated: what its sharpness refers to.
     references: OnceLock<Vec<f64>>,
     edges: usize,
@@ -34,6 +38,8 @@ pub struct Trial<'d> {
     pub terms: Vec<f64>,
     /// Of each term that is a soft maximum.
     levels: Vec<Option<Level>>,
+    /// Per counted state its equilibria under the load cases; empty without load cases.
+    loaded: Vec<Vec<Equilibrium>>,
 }
 
 impl Trial<'_> {
@@ -59,10 +65,12 @@ impl Trial<'_> {
 impl<'d> Problem<'d> {
     /// Rods get `edges` edges each.
     pub fn new(design: &'d Design, layout: &'d Layout, edges: usize) -> Self {
+        let (objectives, cases) = objectives::build(design, layout);
         Self {
             design,
             layout,
-            objectives: objectives::build(design),
+            objectives,
+            cases,
             references: OnceLock::new(),
             edges,
             simulations: AtomicUsize::new(0),
@@ -115,8 +123,9 @@ impl<'d> Problem<'d> {
         let p = self.to_parameters(x);
         let model = Model::new(self.design, self.layout, &p, self.edges, true).ok()?;
         let cycle = sweep(&model).ok()?;
+        let loaded = self.load(&model, &cycle)?;
         let views: Vec<StateView> =
-            (0..self.layout.counted_states()).map(|s| self.view(&model, &cycle, s)).collect();
+            (0..self.layout.counted_states()).map(|s| self.view(&model, &cycle, &loaded, s)).collect();
         let references = self.references.get_or_init(|| {
             let largest = |o: &Term| match o {
                 Term::Sum(_) => 0.0,
@@ -142,13 +151,45 @@ impl<'d> Problem<'d> {
         drop(views);
         terms.push(guards::cost(&model));
         let cost: f64 = terms.iter().sum();
-        cost.is_finite().then(|| Trial { x: x.to_vec(), model, cycle, cost, terms, levels })
+        cost.is_finite().then(|| Trial { x: x.to_vec(), model, cycle, cost, terms, levels, loaded })
     }
 
-    fn view<'a>(&self, model: &'a Model<'d>, cycle: &'a Cycle, state: usize) -> StateView<'a> {
+    /// Equilibria under the load cases; none where one cannot be found.
+    fn load(&self, model: &Model<'d>, cycle: &Cycle) -> Option<Vec<Vec<Equilibrium>>> {
+        if self.cases.is_empty() {
+            return Some(Vec::new());
+        }
+        (0..self.layout.counted_states())
+            .into_par_iter()
+            .map_init(
+                || Solver::new(model),
+                |solver, s| {
+                    let target = self.target(s);
+                    let load = |case: &Vec<PointForce>| {
+                        solver.load(model, &cycle.states[s], &target, case.get(s..=s)?).ok()
+                    };
+                    self.cases.iter().map(load).collect()
+                },
+            )
+            .collect()
+    }
+
+    /// Drive values of a state relative to rest, rad.
+    fn target(&self, state: usize) -> Vec<f64> {
+        self.layout.drives.iter().map(|d| d.values_rad[state] - d.rest_rad).collect()
+    }
+
+    fn view<'a>(
+        &self,
+        model: &'a Model<'d>,
+        cycle: &'a Cycle,
+        loaded: &'a [Vec<Equilibrium>],
+        state: usize,
+    ) -> StateView<'a> {
         StateView {
             model,
             equilibrium: &cycle.states[state],
+            loaded: loaded.get(state).map_or(&[], |l| l),
             state,
             share: objectives::STEPS_OF_WEIGHTS / self.layout.counted_states() as f64,
         }
@@ -164,11 +205,16 @@ impl<'d> Problem<'d> {
             .map_init(
                 || SensitivityWorkspace::new(&trial.model),
                 |workspace, s| {
-                    let target: Vec<f64> =
-                        self.layout.drives.iter().map(|d| d.values_rad[s] - d.rest_rad).collect();
-                    let view = self.view(&trial.model, &trial.cycle, s);
+                    let target = self.target(s);
+                    let view = self.view(&trial.model, &trial.cycle, &trial.loaded, s);
                     let free = workspace.at(&trial.model, view.equilibrium, &target).ok()?;
-                    Some(self.state_parts(trial, &view, &StatesSensitivity { free }))
+                    let loaded = self
+                        .cases
+                        .iter()
+                        .zip(view.loaded)
+                        .map(|(case, e)| workspace.at_loaded(&trial.model, e, &target, case.get(s..=s)?).ok())
+                        .collect::<Option<Vec<_>>>()?;
+                    Some(self.state_parts(trial, &view, &StatesSensitivity { free, loaded }))
                 },
             )
             .collect();

@@ -121,6 +121,11 @@ impl Stages for Compiler {
         if found.ending == Ending::NoStart {
             // Say why, by simulating the start once more.
             self.simulate(design, start)?;
+            let message = "the optimiser has nowhere to begin: an objective cannot be computed at the start";
+            return Err(vec![
+                Diagnostic::error("E0611", message, design.origin)
+                    .help("a `sway` force may be more than the flexures bear: give it a smaller `force`"),
+            ]);
         }
         let values = design.free.iter().map(|f| f.path.clone()).zip(found.p).collect();
         let mut diagnostics = Vec::new();

@@ -4,12 +4,13 @@
 
 mod soft_maximum;
 mod stress;
+mod sway;
 mod torque;
 mod track;
 
 pub use soft_maximum::{Level, Sampled};
 
-use crate::equilibrium::{Equilibrium, Model, Sensitivity};
+use crate::equilibrium::{Equilibrium, Layout, Model, PointForce, Sensitivity};
 use crate::ir::{Design, ObjectiveKind};
 use crate::math::skew;
 use crate::optimize::Normal;
@@ -25,6 +26,8 @@ pub struct StateView<'a> {
     pub model: &'a Model<'a>,
     /// The equilibrium.
     pub equilibrium: &'a Equilibrium,
+    /// The equilibria under the load cases that [`build`] asks for.
+    pub loaded: &'a [Equilibrium],
     /// Index of the state.
     pub state: usize,
     /// Weight of this state in sums over the cycle: 60 / number of counted states.
@@ -35,6 +38,8 @@ pub struct StateView<'a> {
 pub struct StatesSensitivity {
     /// Of the equilibrium without loads.
     pub free: Sensitivity,
+    /// Of those under each load case.
+    pub loaded: Vec<Sensitivity>,
 }
 
 /// A term of the objective, a sum over states.
@@ -65,18 +70,24 @@ impl Term {
     }
 }
 
-/// The design's terms.
-pub fn build(design: &Design) -> Vec<Term> {
-    design
+/// The design's terms, and the load cases they need: per case one force a state.
+pub fn build(design: &Design, layout: &Layout) -> (Vec<Term>, Vec<Vec<PointForce>>) {
+    let mut cases = Vec::new();
+    let terms = design
         .objectives
         .iter()
         .map(|o| match &o.kind {
-            ObjectiveKind::Track { trace, scale_mm } => Term::Sum(Box::new(track::Track::new(
-                &design.traces[*trace].name,
-                *trace,
-                *scale_mm,
-                o.weight,
-            ))),
+            ObjectiveKind::Track { trace, scale_mm } => {
+                let name = &design.traces[*trace].name;
+                Term::Sum(Box::new(track::Track::new(name, *trace, *scale_mm, o.weight)))
+            }
+            ObjectiveKind::Sway { trace, force_n, scale_mm } => {
+                let first = cases.len();
+                cases.extend(sway::load_cases(design, layout, *trace, *force_n));
+                let name = &design.traces[*trace].name;
+                let term = sway::Sway::new(name, *trace, first..cases.len(), *scale_mm, o.weight);
+                Term::Sum(Box::new(term))
+            }
             ObjectiveKind::StressBelow { bound_mpa, scale_mpa } => {
                 Term::Sum(Box::new(stress::StressBelow::new(*bound_mpa, *scale_mpa, o.weight)))
             }
@@ -88,7 +99,8 @@ pub fn build(design: &Design) -> Vec<Term> {
                 Term::Peak(Box::new(torque::Torque::new(name, *drive, *reference_n_mm, o.weight)))
             }
         })
-        .collect()
+        .collect();
+    (terms, cases)
 }
 
 /// Derivatives of a body's point (rest coordinates) by the n design parameters, 3 × n; none on ground.
