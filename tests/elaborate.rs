@@ -259,6 +259,17 @@ fn terms_have_the_papers_weights_and_their_scales() {
 }
 
 #[test]
+fn a_gap_can_be_required() {
+    let d = design(run(&CHEBYSHEV.replace(
+        "require max(error(tip))    <= 1 mm",
+        "require min(gap()) >= 0.2 mm\n    require 0.2 mm <= min(gap())",
+    )));
+    let gaps: Vec<_> = d.requirements.iter().take(2).map(|r| (&r.quantity, r.aggregate, r.at_most)).collect();
+    assert_eq!(gaps, [(&Quantity::Gap, flexura::ir::Aggregate::Min, false); 2]);
+    assert!((d.requirements[0].bound - 0.2).abs() < 1e-12);
+}
+
+#[test]
 fn torque_needs_something_to_compare_with() {
     let text = CHEBYSHEV
         .replace("track(tip, scale = 0.1 mm)", "torque(motor)")

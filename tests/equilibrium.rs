@@ -1,5 +1,6 @@
 //! The compliant mechanism in equilibrium: torque computed two ways, energy over a closed cycle,
 //! independence of the way, derivatives by the design parameters against differences.
+#![allow(clippy::unwrap_used)]
 
 use flexura::elaborate::{Options, elaborate};
 use flexura::equilibrium::{Cycle, Layout, Model, SensitivityWorkspace, sweep};

@@ -1,4 +1,5 @@
 //! Equilibria under point forces: derivatives of the load, compliance, reciprocity, work and energy.
+#![allow(clippy::unwrap_used)]
 
 use flexura::elaborate::{Options, elaborate};
 use flexura::equilibrium::{Equilibrium, Layout, Model, PointForce, Solver, sweep};

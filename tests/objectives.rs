@@ -1,5 +1,6 @@
 //! Every term of the objective by itself: its gradient against differences at random feasible designs, its
 //! quadratic model, and what it means.
+#![allow(clippy::unwrap_used)]
 
 use flexura::elaborate::{Options, elaborate};
 use flexura::equilibrium::Layout;
@@ -128,4 +129,29 @@ fn optimising_a_peak_lowers_it() {
         let found = optimize(problem, Method::LevenbergMarquardt, &start, 8, &cancel, &|_| ());
         assert!(found.cost < 0.5 * before, "{kind:?}: {} of {before}", found.cost);
     }
+}
+
+/// All terms together have the same bits on any number of threads.
+#[test]
+fn derivatives_do_not_depend_on_threads() {
+    let kinds = [
+        ObjectiveKind::Track { trace: 0, scale_mm: Some(0.1) },
+        ObjectiveKind::Sway { trace: 0, force_n: 0.5, scale_mm: Some(1.0) },
+        ObjectiveKind::Torque { drive: 0, reference_n_mm: 100.0 },
+        ObjectiveKind::StressBelow { bound_mpa: 10.0, scale_mpa: Some(1.0) },
+        ObjectiveKind::Stress { scale_mpa: Some(10.0) },
+    ];
+    let (design, layout) = with_terms(7, &kinds);
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let problem = Problem::new(&design, &layout, EDGES);
+            let (trial, normal) = at(&problem, &design, 3);
+            assert!(trial.terms[..5].iter().all(|t| *t > 0.0), "{:?}", trial.terms);
+            (trial.terms, normal)
+        })
+    };
+    let one = run(1);
+    check_model(&one.1);
+    assert!(one == run(2) && one == run(3));
 }

@@ -369,6 +369,8 @@ pub enum Quantity {
     Error(usize),
     /// True largest von Mises stress over all rods, MPa.
     Stress,
+    /// Least gap of the printed solids, mm; negative where two overlap.
+    Gap,
     /// Size of the drive's torque, N·mm. Index into [`Design::drives`].
     Torque(usize),
 }
