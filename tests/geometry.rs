@@ -4,9 +4,12 @@
 mod chebyshev;
 
 use chebyshev::{BASE, CLEARANCE, COUPLER, CRANK_BODY, HEIGHT, ROCKER, THICK, chebyshev as input, poses};
+use flexura::geometry::link::Role;
 use flexura::geometry::{
-    Bore, Facets, Member, Parts, PartsInput, Probe, build_parts, check_mesh, least_gap, plan_bodies,
+    Bore, Facets, Member, MovedState, Parts, PartsInput, Probe, build_parts, check_mesh, cycle_gaps,
+    plan_bodies,
 };
+use flexura::math::Pose;
 use nalgebra::Vector3;
 
 #[allow(clippy::unwrap_used)]
@@ -147,14 +150,54 @@ fn an_eye_without_a_stated_pin_stays_solid_and_says_so() {
     assert!(parts.parts[1].notes.iter().any(|n| n.contains("no pin diameter")), "{:?}", parts.parts[1].notes);
 }
 
+/// The mechanism in 60 states, without its flexures.
+fn turns() -> Vec<MovedState> {
+    (0..60).map(|k| MovedState { poses: poses(120.0 + 6.0 * k as f64), flexures: Vec::new() }).collect()
+}
+
+/// Only the crank counts: the other bodies meet each other in flexures.
+fn without_crank(a: Member, b: Member) -> bool {
+    ![a, b].contains(&Member::Body(CRANK_BODY))
+}
+
+/// A leaf bent into its own link, and into another body, is found at the state where it happens; where it is
+/// attached it may touch.
+#[test]
+fn a_leaf_that_rubs_is_found() {
+    let input = input(25.0, Facets::default());
+    let plans = plan_bodies(&input).unwrap();
+    let rest: Vec<Pose> = poses(120.0).iter().map(|p| Pose::rest(p.center)).collect();
+    let still = MovedState { poses: rest, flexures: input.flexures.clone() };
+    let only_leaves = |a: Member, b: Member| matches!((a, b), (Member::Body(_), Member::Body(_)));
+    let gaps = cycle_gaps(&plans, std::slice::from_ref(&still), only_leaves);
+    assert_eq!(gaps.overlaps, []);
+    assert!(gaps.least[0].unwrap().gap_mm > 0.0);
+    // The middle of one leaf is pushed onto its own link's nearest slot.
+    let mut bent = still.clone();
+    let leaf = &mut bent.flexures[0];
+    let owner = leaf.bodies.0;
+    let bars = plans[owner].slots.iter().filter(|(r, _)| *r == Role::Bar).map(|(_, s)| *s);
+    let middle = leaf.centreline.len() / 2;
+    let onto = bars.map(|s| (s.start + s.end) / 2.0).next().unwrap();
+    let shift = onto - leaf.centreline[middle];
+    let last = (leaf.centreline.len() - 1) as f64;
+    for (k, p) in leaf.centreline.iter_mut().enumerate() {
+        *p += shift * (std::f64::consts::PI * k as f64 / last).sin();
+    }
+    let gaps = cycle_gaps(&plans, &[still, bent], only_leaves);
+    let own = gaps.overlaps.iter().find(|o| (o.a, o.b) == (Member::Body(owner), Member::Flexure(0))).unwrap();
+    assert!(own.state == 1 && own.gap_mm < 0.0, "{own:?}");
+    assert!(gaps.least[1].unwrap().gap_mm <= own.gap_mm);
+}
+
 #[test]
 fn the_crank_turns_fully_with_the_clearance_kept() {
     let input = input(25.0, Facets::default());
     let plans = plan_bodies(&input).unwrap();
-    let states: Vec<_> = (0..60).map(|k| poses(120.0 + 6.0 * k as f64)).collect();
-    // Only the crank: the other bodies meet each other in flexures.
-    let skipped = [(BASE, COUPLER), (BASE, ROCKER), (COUPLER, ROCKER)];
-    let gaps = least_gap(&plans, &states, &skipped);
+    let states = turns();
+    let gaps = cycle_gaps(&plans, &states, without_crank);
+    assert_eq!(gaps.overlaps, []);
+    let gaps = gaps.least;
     assert_eq!(gaps.len(), 60);
     for gap in gaps {
         let gap = gap.unwrap();
@@ -174,9 +217,11 @@ fn a_body_in_the_cranks_way_is_found_at_the_right_state() {
         slot: (0, 1),
     });
     let plans = plan_bodies(&input).unwrap();
-    let states: Vec<_> = (0..60).map(|k| poses(120.0 + 6.0 * k as f64)).collect();
-    let skipped = [(BASE, COUPLER), (BASE, ROCKER), (COUPLER, ROCKER)];
-    let gaps: Vec<f64> = least_gap(&plans, &states, &skipped).iter().map(|g| g.unwrap().gap_mm).collect();
+    let found = cycle_gaps(&plans, &turns(), without_crank);
+    let gaps: Vec<f64> = found.least.iter().map(|g| g.unwrap().gap_mm).collect();
+    let pairs: Vec<_> = found.overlaps.iter().map(|o| (o.a, o.b)).collect();
+    assert_eq!(pairs, [(Member::Body(BASE), Member::Body(CRANK_BODY))]);
+    assert_eq!(found.overlaps[0].gap_mm, gaps.iter().copied().fold(f64::INFINITY, f64::min));
     let worst = gaps.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1)).unwrap();
     assert!(*worst.1 < -1.0 && worst.0.abs_diff(40) <= 4, "{worst:?}");
     assert!(gaps[10] >= CLEARANCE, "{}", gaps[10]);

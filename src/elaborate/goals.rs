@@ -1,4 +1,4 @@
-//! Time, traces, objectives and exports of a mechanism.
+//! Time, traces and exports of a mechanism.
 
 use super::codes;
 use super::dimension::Dimension;
@@ -6,20 +6,12 @@ use super::eval::{Env, Evaluator, Failed, Outcome};
 use super::sheet::{DriveText, Sheet, TraceText};
 use super::structure::Structure;
 use crate::diagnostic::Diagnostic;
-use crate::ir::{Cycle, Export, ExportKind, Objective, ObjectiveKind, Trace};
-use crate::syntax::ast::{self, Argument, Expr, ExprKind, Ident};
+use crate::ir::{Cycle, Export, ExportKind, Trace};
+use crate::syntax::ast::{Argument, Expr, ExprKind, Ident};
 use std::collections::BTreeMap;
 
 /// Most steps of a cycle.
 const MAX_STEPS: f64 = 100_000.0;
-/// The paper's weights (section 5) for terms in SI units.
-const TRACK_WEIGHT: f64 = 1e5;
-const STRESS_WEIGHT: f64 = 1e-6;
-
-/// Objectives and queries of the target language that this version does not have.
-const LATER_TERMS: &[&str] =
-    &["sway", "torque", "collision", "force", "gap", "buckling", "tension", "multistable", "mass"];
-const TERMS: &[&str] = &["track", "stress"];
 const EXPORTS: &[&str] = &["stl", "arduino"];
 const LATER_EXPORTS: &[&str] = &["threemf", "report", "gltf", "dynamixel", "micropython", "csv", "svg"];
 
@@ -59,82 +51,6 @@ impl<'a> Evaluator<'a> {
         let body = self.thing(scope, &s.body_index, text.body, "body");
         let point = self.eval(&Env::fixed(scope), text.point).and_then(|v| self.as_point(v, text.point));
         Ok(Trace { name: text.name.node.clone(), body: body?, point: point?, origin: text.at })
-    }
-
-    pub(super) fn objective(
-        &mut self,
-        scope: usize,
-        term: &'a ast::Term,
-        traces: &BTreeMap<String, usize>,
-    ) -> Outcome<Objective> {
-        let ExprKind::Call { function, arguments } = &term.call.kind else {
-            if matches!(term.call.kind, ExprKind::Broken) {
-                return Err(Failed);
-            }
-            return self.fail(
-                Diagnostic::error(codes::TYPE, "a term of `minimize` is a call", term.call.at)
-                    .help("such as `track(tip)`"),
-            );
-        };
-        let name = function.node.as_str();
-        let (kind, default) = match name {
-            "track" => {
-                let slots = self.arguments(function, arguments, &["trace", "scale"], 1)?;
-                let trace = self.trace_argument(scope, slots.first().copied().flatten(), traces);
-                let scale_mm = self.scale(scope, slots.get(1).copied().flatten(), Dimension::LENGTH)?;
-                (
-                    ObjectiveKind::Track { trace: trace?, scale_mm },
-                    if scale_mm.is_some() { 1.0 } else { TRACK_WEIGHT },
-                )
-            }
-            "stress" => {
-                let slots = self.arguments(function, arguments, &["below", "scale"], 0)?;
-                let Some(below) = slots.first().copied().flatten() else {
-                    return self.fail(
-                        Diagnostic::error(
-                            codes::LATER_TERM,
-                            "`stress()` without a bound is not available yet",
-                            function.at,
-                        )
-                        .help("write `stress(below = 25 MPa)`"),
-                    );
-                };
-                let bound_mpa = self.eval_fixed(scope, below, Dimension::STRESS, "the stress bound");
-                let scale_mpa = self.scale(scope, slots.get(1).copied().flatten(), Dimension::STRESS)?;
-                let bound_mpa = bound_mpa?;
-                if bound_mpa <= 0.0 {
-                    return self.fail(Diagnostic::error(
-                        codes::SIZE,
-                        "a stress bound must be positive",
-                        below.at,
-                    ));
-                }
-                let default = if scale_mpa.is_some() { 1.0 } else { STRESS_WEIGHT };
-                (ObjectiveKind::StressBelow { bound_mpa, scale_mpa }, default)
-            }
-            _ if LATER_TERMS.contains(&name) => return self.later(codes::LATER_TERM, name, function.at),
-            _ => return self.unknown_of(function, "objective", TERMS),
-        };
-        let weight = match &term.weight {
-            None => default,
-            Some(e) => {
-                let w = self.eval_fixed(scope, e, Dimension::NUMBER, "a weight")?;
-                if w < 0.0 {
-                    return self.fail(Diagnostic::error(codes::SIZE, "a weight must not be negative", e.at));
-                }
-                w
-            }
-        };
-        Ok(Objective { kind, weight, origin: term.at })
-    }
-
-    fn scale(&mut self, scope: usize, e: Option<&'a Expr>, dim: Dimension) -> Outcome<Option<f64>> {
-        let Some(e) = e else { return Ok(None) };
-        let v = self.eval_fixed(scope, e, dim, "a scale")?;
-        if v <= 0.0 {
-            return self.fail(Diagnostic::error(codes::SIZE, "a scale must be positive", e.at));
-        }
-        Ok(Some(v))
     }
 
     pub(super) fn unknown_of<T>(&mut self, name: &Ident, what: &str, known: &[&str]) -> Outcome<T> {

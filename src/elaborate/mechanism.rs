@@ -6,6 +6,7 @@ use super::graph;
 use super::sheet::Sheet;
 use super::structure::Structure;
 use super::template::Site;
+use super::terms::Named;
 use super::value::ItemRef;
 use crate::diagnostic::{Diagnostic, Origin, SourceMap};
 use crate::ir::expr::ExprId;
@@ -77,11 +78,12 @@ impl<'a> Evaluator<'a> {
                 traces.push(t);
             }
         }
+        let driven = drive_names(&drives, &sheet);
+        let named = Named { traces: &trace_index, driven: &driven, drives: drives.as_deref() };
         let mut objectives = Vec::new();
         for term in sheet.minimize.map(|(terms, _)| terms).unwrap_or_default() {
-            objectives.extend(self.objective(scope, term, &trace_index));
+            objectives.extend(self.objective(scope, term, &named));
         }
-        let driven = drive_names(&drives, &sheet);
         let mut requirements = Vec::new();
         for text in &sheet.requires {
             let line = quote(outside.sources, text.at);

@@ -26,6 +26,7 @@ mod settings;
 mod sheet;
 mod structure;
 mod template;
+mod terms;
 pub mod units;
 mod value;
 

@@ -10,8 +10,8 @@ use crate::syntax::ast::{Argument, Compare, Expr, ExprKind, Ident};
 use std::collections::BTreeMap;
 
 const AGGREGATES: &[&str] = &["max", "min", "mean", "span", "at"];
-const LATER_QUANTITIES: &[&str] = &["tension", "gap", "buckling", "angle"];
-const QUANTITIES: &[&str] = &["error", "stress", "torque", "force"];
+const LATER_QUANTITIES: &[&str] = &["tension", "buckling", "angle"];
+const QUANTITIES: &[&str] = &["error", "stress", "torque", "force", "gap"];
 /// A query as written: `max(error(tip))`.
 struct Query<'a> {
     outer: Option<&'a Ident>,
@@ -129,6 +129,10 @@ impl<'a> Evaluator<'a> {
             "stress" => {
                 self.arguments(name, args, &[], 0)?;
                 Ok((Quantity::Stress, Dimension::STRESS))
+            }
+            "gap" => {
+                self.arguments(name, args, &[], 0)?;
+                Ok((Quantity::Gap, Dimension::LENGTH))
             }
             "torque" => {
                 let slots = self.arguments(name, args, &["drive"], 1)?;

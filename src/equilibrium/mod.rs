@@ -6,12 +6,14 @@
 //! symmetric saddle-point system of link increments and multipliers.
 
 mod layout;
+mod load;
 mod model;
 mod newton;
 mod sensitivity;
 mod sweep;
 
 pub use layout::{Layout, RodEndFrame};
+pub use load::PointForce;
 pub use model::{Model, ModelError, ModelRod, State};
 pub use newton::{Equilibrium, SolveError, Solver};
 pub use sensitivity::{Sensitivity, SensitivityWorkspace};

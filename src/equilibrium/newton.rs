@@ -1,6 +1,7 @@
 //! Newton's method on the total potential with constraints: rod by rod condensation, one small
 //! saddle-point system for links and multipliers, full steps first.
 
+use super::load::{PointForce, scatter_loads};
 use super::model::{Model, State};
 use crate::ir::DriveUnit;
 use crate::kinematics::{Constraint, Jacobian};
@@ -72,6 +73,8 @@ pub struct Solver {
     pub(super) scale: DVector<f64>,
     pub(super) rods_positive: bool,
     jacobian: Jacobian,
+    /// Of the last solution asked for.
+    loads: Vec<PointForce>,
 }
 
 /// Sizes of what is not yet in balance.
@@ -119,6 +122,7 @@ impl Solver {
             scale,
             rods_positive: false,
             jacobian: Jacobian::default(),
+            loads: Vec::new(),
         }
     }
 
@@ -128,6 +132,22 @@ impl Solver {
     /// # Errors
     /// [`SolveError`]; `state` is then of no use.
     pub fn solve(&mut self, model: &Model, state: State, target: &[f64]) -> Result<Equilibrium, SolveError> {
+        self.solve_loaded(model, state, target, &[])
+    }
+
+    /// The same under dead forces. For large forces see [`Self::load`].
+    ///
+    /// # Errors
+    /// As [`Self::solve`].
+    pub fn solve_loaded(
+        &mut self,
+        model: &Model,
+        state: State,
+        target: &[f64],
+        loads: &[PointForce],
+    ) -> Result<Equilibrium, SolveError> {
+        self.loads.clear();
+        self.loads.extend_from_slice(loads);
         let mut state = state;
         for iteration in 0..ITERATIONS {
             let residual = self.assemble(model, &mut state, target);
@@ -170,6 +190,10 @@ impl Solver {
         self.for_each_row(model, state, target, |_, bodies, lambda, residual, weight, row| {
             constraint_mm = constraint_mm.max((residual * weight).abs());
             scatter(model, bodies, &(row * lambda), &mut gradient);
+        });
+        scatter_loads(model, state, &self.loads, |first, g| {
+            let mut rows = gradient.fixed_rows_mut::<6>(first);
+            rows += g;
         });
         let mut force_n = internal;
         for i in 0..gradient.len() {
@@ -242,6 +266,12 @@ impl Solver {
             let h = drive.joint.hessian(&state.poses) * state.lambda[row + i];
             scatter_matrix(model, drive.joint.bodies(), &h, &mut k);
         }
+        for load in &self.loads {
+            if let Some(first) = model.layout.bodies[load.body].first_dof {
+                let mut block = k.fixed_view_mut::<6, 6>(first, first);
+                block += load.hessian(&state.poses[load.body]);
+            }
+        }
         let target: Vec<f64> = state.drives.clone();
         self.for_each_row(model, state, &target, |row, bodies, _, _, _, gradient| {
             for (half, body) in bodies.into_iter().enumerate() {
@@ -293,6 +323,10 @@ impl Solver {
         self.for_each_row(model, state, target, |row, bodies, lambda, residual, _, row_gradient| {
             scatter(model, bodies, &(row_gradient * lambda), &mut gradient);
             rhs[n + row] = -residual;
+        });
+        scatter_loads(model, state, &self.loads, |first, g| {
+            let mut rows = gradient.fixed_rows_mut::<6>(first);
+            rows += g;
         });
         for i in 0..n {
             rhs[i] = -gradient[i];

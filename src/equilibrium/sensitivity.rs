@@ -1,6 +1,7 @@
 //! Derivatives of an equilibrium by the design parameters (Megaro et al. 2017, eqs. 18–19), in the
 //! forward form: one back-substitution per parameter with the factors of the accepted state.
 
+use super::load::PointForce;
 use super::model::Model;
 use super::newton::{Equilibrium, SolveError, Solver};
 use crate::rod::{PARAMETERS, StrainJacobian};
@@ -40,9 +41,23 @@ impl SensitivityWorkspace {
         equilibrium: &Equilibrium,
         target: &[f64],
     ) -> Result<Sensitivity, SolveError> {
+        self.at_loaded(model, equilibrium, target, &[])
+    }
+
+    /// The same at an equilibrium under dead forces that do not depend on the parameters.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the equilibrium given is none.
+    pub fn at_loaded(
+        &mut self,
+        model: &Model,
+        equilibrium: &Equilibrium,
+        target: &[f64],
+        loads: &[PointForce],
+    ) -> Result<Sensitivity, SolveError> {
         let solver = &mut self.solver;
         // Assembles and factors at the state itself; an accepted one takes no further iteration.
-        solver.solve(model, equilibrium.state.clone(), target)?;
+        solver.solve_loaded(model, equilibrium.state.clone(), target, loads)?;
         let (n, m) = (model.layout.dofs(), model.rows());
         let parameters = model.rods.first().map_or(0, |r| r.dq_dp.ncols());
         let mut rhs = DMatrix::zeros(n + m, parameters);

@@ -1,21 +1,18 @@
-//! What grows together or comes too near: overlaps of bodies in the rest pose, where they would be
-//! printed as one, and the least gap over the states of a cycle.
+//! What grows together or comes too near in the rest pose, where it would be printed as one.
 
 use super::distance::separation;
 use super::link::{BodyPlan, Role};
 use super::parts::PartsInput;
 use super::slot::Slot;
-use crate::math::Pose;
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 /// Next to its ends a flexure cannot keep the clearance from its own link, mm…
-const NEAR_MM: f64 = 4.0;
+pub(super) const NEAR_MM: f64 = 4.0;
 /// … but farther than this from its attachment planes it must not be swallowed by it, mm.
-const ROOT_MM: f64 = 0.6;
+pub(super) const ROOT_MM: f64 = 0.6;
 
 /// One side of an overlap.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Member {
     /// Index of a body.
     Body(usize),
@@ -121,69 +118,4 @@ fn worst(a: &[Slot], b: &[Slot], bound_mm: f64) -> Option<(f64, Vector3<f64>)> {
         }
     }
     best.1.map(|at| (best.0, at))
-}
-
-/// Least gap between two bodies at one state.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LeastGap {
-    /// State (index into the poses).
-    pub state: usize,
-    /// Bodies.
-    pub bodies: (usize, usize),
-    /// Gap, mm; negative when they overlap.
-    pub gap_mm: f64,
-    /// Where, in the pose of that state.
-    pub at: Vector3<f64>,
-}
-
-/// Least gap of each state over all pairs of bodies but the `skipped` ones (in any order; the eyes
-/// of a conventional joint that both bodies share are left out by themselves, as they turn in each
-/// other's slots by construction). `poses[state][body]`; a state of the wrong size gives `None`,
-/// as does one with no pair to compare.
-pub fn least_gap(
-    plans: &[BodyPlan],
-    poses: &[Vec<Pose>],
-    skipped: &[(usize, usize)],
-) -> Vec<Option<LeastGap>> {
-    let skip = |i: usize, j: usize| skipped.contains(&(i, j)) || skipped.contains(&(j, i));
-    poses
-        .par_iter()
-        .enumerate()
-        .map(|(state, pose)| {
-            if pose.len() != plans.len() {
-                return None;
-            }
-            let moved: Vec<Vec<(Role, Slot)>> = plans
-                .iter()
-                .zip(pose)
-                .map(|(plan, pose)| plan.slots.iter().map(|(r, s)| (*r, s.moved(pose))).collect())
-                .collect();
-            let mut best: Option<LeastGap> = None;
-            for i in 0..moved.len() {
-                for j in (i + 1)..moved.len() {
-                    if skip(i, j) {
-                        continue;
-                    }
-                    for (role_p, p) in &moved[i] {
-                        let (cp, rp) = p.bounding_sphere();
-                        for (role_q, q) in &moved[j] {
-                            if matches!((role_p, role_q), (Role::Eye(a), Role::Eye(b)) if a == b) {
-                                continue;
-                            }
-                            let (cq, rq) = q.bounding_sphere();
-                            let bound = best.map_or(f64::INFINITY, |b| b.gap_mm);
-                            if (cp - cq).norm() - rp - rq >= bound {
-                                continue;
-                            }
-                            let s = separation(p, q);
-                            if s.gap_mm < bound {
-                                best = Some(LeastGap { state, bodies: (i, j), gap_mm: s.gap_mm, at: s.at });
-                            }
-                        }
-                    }
-                }
-            }
-            best
-        })
-        .collect()
 }

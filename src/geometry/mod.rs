@@ -9,9 +9,10 @@
 //! | `tidy` | removal of tiny edges before rounding to `f32` |
 //! | `union` | the boolean kernel's only client |
 //! | `mesh`, `check`, `ray` | triangle meshes, their facts, measurements on them |
-//! | `distance`, `gap` | least distances, overlaps in the rest pose, gaps over a cycle |
+//! | `distance`, `gap`, `cycle` | least distances, overlaps in the rest pose, gaps over a cycle |
 
 pub mod check;
+pub mod cycle;
 pub mod distance;
 pub mod gap;
 pub mod link;
@@ -28,7 +29,8 @@ pub mod union;
 mod tests;
 
 pub use check::{MeshFacts, check_mesh};
-pub use gap::{Fusion, LeastGap, Member, least_gap};
+pub use cycle::{CycleGaps, LeastGap, MovedState, cycle_gaps};
+pub use gap::{Fusion, Member};
 pub use mesh::Mesh;
 pub use parts::{
     BodySolid, Bore, Eye, FlexureSolid, GeometryError, Part, Parts, PartsInput, build_parts, plan_bodies,

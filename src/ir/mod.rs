@@ -279,12 +279,33 @@ pub enum ObjectiveKind {
         /// Length that counts as one; none: SI (1 m).
         scale_mm: Option<f64>,
     },
+    /// Displacement of a trace under forces normal to its path (paper, eq. 4).
+    Sway {
+        /// Index into [`Design::traces`].
+        trace: usize,
+        /// Size of each force.
+        force_n: f64,
+        /// Length that counts as one; none: SI (1 m).
+        scale_mm: Option<f64>,
+    },
     /// Squared excess of von Mises stress over a bound.
     StressBelow {
         /// The bound.
         bound_mpa: f64,
         /// Stress that counts as one; none: SI (1 Pa).
         scale_mpa: Option<f64>,
+    },
+    /// Soft maximum of von Mises stress (paper, eq. 16, made monotone).
+    Stress {
+        /// Stress that counts as one; none: SI (1 Pa).
+        scale_mpa: Option<f64>,
+    },
+    /// Soft maximum of the squared torque (paper, eq. 6, made monotone).
+    Torque {
+        /// Index into [`Design::drives`].
+        drive: usize,
+        /// Torque that counts as one: the motor's stall torque, or the scale in the text.
+        reference_n_mm: f64,
     },
 }
 
@@ -331,6 +352,8 @@ pub enum Quantity {
     Error(usize),
     /// True largest von Mises stress over all rods, MPa.
     Stress,
+    /// Least gap of the printed solids, mm; negative where two overlap.
+    Gap,
     /// Size of the drive's torque, N·mm. Index into [`Design::drives`].
     Torque(usize),
     /// Size of a slider drive's force, N. Index into [`Design::drives`].

@@ -34,6 +34,21 @@ impl Normal {
         }
     }
 
+    /// Adds a function of r with first derivative `slope` and second derivative `curvature` (at least 0), its
+    /// value apart; `row` is the gradient of r.
+    pub fn add_model(&mut self, slope: f64, curvature: f64, row: &[f64]) {
+        for (j, rj) in row.iter().enumerate() {
+            if *rj == 0.0 {
+                continue;
+            }
+            self.gradient[j] += slope * rj;
+            let w = curvature * rj;
+            for (i, ri) in row.iter().enumerate().skip(j) {
+                self.gauss_newton[(i, j)] += w * ri;
+            }
+        }
+    }
+
     /// Adds a sum over m other variables that depend on the n through `chain` (m × n).
     pub fn add_chained(&mut self, other: &Self, chain: &DMatrix<f64>) {
         self.cost += other.cost;

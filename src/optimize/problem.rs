@@ -3,17 +3,24 @@
 use super::box_qp::Hinge;
 use super::guards;
 use super::normal::Normal;
-use super::objectives::{self, Objective, StateView};
-use crate::equilibrium::{Cycle, Layout, Model, SensitivityWorkspace, sweep};
+use super::objectives::{self, Level, StateView, StatesSensitivity, Term};
+use crate::equilibrium::{
+    Cycle, Equilibrium, Layout, Model, PointForce, SensitivityWorkspace, Solver, sweep,
+};
 use crate::ir::Design;
 use rayon::prelude::*;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A design, its layout and its objective.
 pub struct Problem<'d> {
     design: &'d Design,
     layout: &'d Layout,
-    objectives: Vec<Box<dyn Objective>>,
+    objectives: Vec<Term>,
+    /// Per load case one force a state.
+    cases: Vec<Vec<PointForce>>,
+    /// Largest sample of each soft maximum at the first point simulated: what its sharpness refers to.
+    references: OnceLock<Vec<f64>>,
     edges: usize,
     simulations: AtomicUsize,
 }
@@ -30,6 +37,10 @@ pub struct Trial<'d> {
     pub cost: f64,
     /// Contribution of each term, in the order of [`Problem::term_names`].
     pub terms: Vec<f64>,
+    /// Of each term that is a soft maximum.
+    levels: Vec<Option<Level>>,
+    /// Per counted state its equilibria under the load cases; empty without load cases.
+    loaded: Vec<Vec<Equilibrium>>,
 }
 
 impl Trial<'_> {
@@ -74,10 +85,13 @@ impl Derivatives {
 impl<'d> Problem<'d> {
     /// Rods get `edges` edges each.
     pub fn new(design: &'d Design, layout: &'d Layout, edges: usize) -> Self {
+        let (objectives, cases) = objectives::build(design, layout);
         Self {
             design,
             layout,
-            objectives: objectives::build(design),
+            objectives,
+            cases,
+            references: OnceLock::new(),
             edges,
             simulations: AtomicUsize::new(0),
         }
@@ -129,20 +143,73 @@ impl<'d> Problem<'d> {
         let p = self.to_parameters(x);
         let model = Model::new(self.design, self.layout, &p, self.edges, true).ok()?;
         let cycle = sweep(&model).ok()?;
-        let mut terms: Vec<f64> = self
-            .objectives
-            .iter()
-            .map(|o| (0..self.layout.counted_states()).map(|s| o.cost(&self.view(&model, &cycle, s))).sum())
-            .collect();
+        let loaded = self.load(&model, &cycle)?;
+        let views: Vec<StateView> =
+            (0..self.layout.counted_states()).map(|s| self.view(&model, &cycle, &loaded, s)).collect();
+        let references = self.references.get_or_init(|| {
+            let largest = |o: &Term| match o {
+                Term::Sum(_) => 0.0,
+                Term::Peak(o) => Level::reference(o.as_ref(), &views),
+            };
+            self.objectives.iter().map(largest).collect()
+        });
+        let mut terms = Vec::with_capacity(self.objectives.len() + 1);
+        let mut levels = Vec::with_capacity(self.objectives.len());
+        for (o, reference) in self.objectives.iter().zip(references) {
+            match o {
+                Term::Sum(o) => {
+                    terms.push(views.iter().map(|view| o.cost(view)).sum());
+                    levels.push(None);
+                }
+                Term::Peak(o) => {
+                    let level = Level::new(o.as_ref(), &views, *reference);
+                    terms.push(o.weight() * level.value);
+                    levels.push(Some(level));
+                }
+            }
+        }
+        drop(views);
         terms.push(guards::cost(&model));
         let cost: f64 = terms.iter().sum();
-        cost.is_finite().then(|| Trial { x: x.to_vec(), model, cycle, cost, terms })
+        cost.is_finite().then(|| Trial { x: x.to_vec(), model, cycle, cost, terms, levels, loaded })
     }
 
-    fn view<'a>(&self, model: &'a Model<'d>, cycle: &'a Cycle, state: usize) -> StateView<'a> {
+    /// Equilibria under the load cases; none where one cannot be found.
+    fn load(&self, model: &Model<'d>, cycle: &Cycle) -> Option<Vec<Vec<Equilibrium>>> {
+        if self.cases.is_empty() {
+            return Some(Vec::new());
+        }
+        (0..self.layout.counted_states())
+            .into_par_iter()
+            .map_init(
+                || Solver::new(model),
+                |solver, s| {
+                    let target = self.target(s);
+                    let load = |case: &Vec<PointForce>| {
+                        solver.load(model, &cycle.states[s], &target, case.get(s..=s)?).ok()
+                    };
+                    self.cases.iter().map(load).collect()
+                },
+            )
+            .collect()
+    }
+
+    /// Drive values of a state relative to rest, rad.
+    fn target(&self, state: usize) -> Vec<f64> {
+        self.layout.drives.iter().map(|d| d.values[state] - d.rest).collect()
+    }
+
+    fn view<'a>(
+        &self,
+        model: &'a Model<'d>,
+        cycle: &'a Cycle,
+        loaded: &'a [Vec<Equilibrium>],
+        state: usize,
+    ) -> StateView<'a> {
         StateView {
             model,
             equilibrium: &cycle.states[state],
+            loaded: loaded.get(state).map_or(&[], |l| l),
             state,
             share: objectives::STEPS_OF_WEIGHTS / self.layout.counted_states() as f64,
         }
@@ -153,25 +220,42 @@ impl<'d> Problem<'d> {
     /// result does not depend on the number of threads.
     pub fn differentiate(&self, trial: &Trial<'d>) -> Option<Derivatives> {
         let n = self.parameters();
-        let parts: Vec<Option<Normal>> = (0..self.layout.counted_states())
+        let parts: Vec<Option<Vec<Normal>>> = (0..self.layout.counted_states())
             .into_par_iter()
             .map_init(
                 || SensitivityWorkspace::new(&trial.model),
                 |workspace, s| {
-                    let target: Vec<f64> = self.layout.drives.iter().map(|d| d.values[s] - d.rest).collect();
-                    let view = self.view(&trial.model, &trial.cycle, s);
-                    let sensitivity = workspace.at(&trial.model, view.equilibrium, &target).ok()?;
-                    let mut part = Normal::new(n);
-                    for o in &self.objectives {
-                        o.accumulate(&view, &sensitivity, &mut part);
-                    }
-                    Some(part)
+                    let target = self.target(s);
+                    let view = self.view(&trial.model, &trial.cycle, &trial.loaded, s);
+                    let free = workspace.at(&trial.model, view.equilibrium, &target).ok()?;
+                    let loaded = self
+                        .cases
+                        .iter()
+                        .zip(view.loaded)
+                        .map(|(case, e)| workspace.at_loaded(&trial.model, e, &target, case.get(s..=s)?).ok())
+                        .collect::<Option<Vec<_>>>()?;
+                    Some(self.state_parts(trial, &view, &StatesSensitivity { free, loaded }))
                 },
             )
             .collect();
-        let mut sum = Normal::new(n);
+        // All sums together first, then each soft maximum.
+        let mut totals: Vec<Normal> = Vec::new();
         for part in parts {
-            sum.merge(&part?);
+            let part = part?;
+            totals.resize_with(part.len(), || Normal::new(n));
+            for (total, part) in totals.iter_mut().zip(&part) {
+                total.merge(part);
+            }
+        }
+        let mut totals = totals.into_iter();
+        let mut sum = totals.next()?;
+        let peaks = self.objectives.iter().zip(&trial.levels).filter_map(|(o, level)| match (o, level) {
+            (Term::Peak(o), Some(level)) => Some((o.weight(), level)),
+            _ => None,
+        });
+        for ((weight, level), mut total) in peaks.zip(totals) {
+            level.complete(weight, &mut total);
+            sum.merge(&total);
         }
         let mut hinges = guards::hinges(&trial.model);
         sum.complete();
@@ -183,5 +267,23 @@ impl<'d> Problem<'d> {
             hinges.iter_mut().for_each(|h| h.row[i] *= width);
         }
         Some(Derivatives { normal: sum, hinges })
+    }
+
+    /// One state's contributions: that of all sums, then of each soft maximum.
+    fn state_parts(&self, trial: &Trial<'d>, view: &StateView, at: &StatesSensitivity) -> Vec<Normal> {
+        let n = self.parameters();
+        let mut parts = vec![Normal::new(n)];
+        for (o, level) in self.objectives.iter().zip(&trial.levels) {
+            match (o, level) {
+                (Term::Sum(o), _) => o.accumulate(view, at, &mut parts[0]),
+                (Term::Peak(o), Some(level)) => {
+                    let mut part = Normal::new(n);
+                    o.accumulate(view, at, level, &mut part);
+                    parts.push(part);
+                }
+                (Term::Peak(_), None) => {}
+            }
+        }
+        parts
     }
 }

@@ -72,7 +72,7 @@ impl Stages for Compiler {
     }
 
     fn simulate(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
-        let (layout, _) = layout(design, values)?;
+        let (layout, motion) = layout(design, values)?;
         let model = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
         let cycle = sweep(&model).map_err(|e| lost(design, &e))?;
         let states = cycle.states.iter().enumerate().map(|(s, e)| MotionState {
@@ -93,9 +93,12 @@ impl Stages for Compiler {
                 cycle.states.iter().zip(&t.target).map(distance).collect()
             })
             .collect();
+        let mut diagnostics = judge(design, &layout, &cycle);
+        let gaps = solids::gaps(design, &layout, &motion, &model, &cycle);
+        diagnostics.extend(solids::collisions(design, &gaps));
+        let gaps_mm = gaps.least.iter().filter_map(|g| g.map(|g| g.gap_mm)).collect();
         let motion = table(design, true, states.collect());
-        let diagnostics = judge(design, &layout, &cycle);
-        Ok(Simulation { motion, errors_mm, diagnostics, ..Simulation::default() })
+        Ok(Simulation { motion, errors_mm, gaps_mm, diagnostics })
     }
 
     fn optimize(
@@ -121,6 +124,11 @@ impl Stages for Compiler {
         if found.ending == Ending::NoStart {
             // Say why, by simulating the start once more.
             self.simulate(design, start)?;
+            let message = "the optimiser has nowhere to begin: an objective cannot be computed at the start";
+            return Err(vec![
+                Diagnostic::error("E0611", message, design.origin)
+                    .help("a `sway` force may be more than the flexures bear: give it a smaller `force`"),
+            ]);
         }
         let values = design.free.iter().map(|f| f.path.clone()).zip(found.p).collect();
         let mut diagnostics = Vec::new();
@@ -146,10 +154,7 @@ impl Stages for Compiler {
         solids::available(design)?;
         let (layout, motion) = layout(design, values)?;
         let model = Model::new(design, &layout, values, MESH_EDGES, false).map_err(|e| no_rod(design, &e))?;
-        let (parts, mut found) = solids::build(design, &layout, &motion, &model)?;
-        let cycle = sweep(&model).map_err(|e| lost(design, &e))?;
-        let poses: Vec<Vec<Pose>> = cycle.states.iter().map(|e| e.state.poses.clone()).collect();
-        found.extend(solids::collisions(design, &parts, &poses));
+        let (parts, found) = solids::build(design, &layout, &motion, &model)?;
         let mut artefacts = Vec::new();
         for part in &parts.parts {
             let bytes = stl_bytes(&part.mesh).map_err(|e| {

@@ -34,7 +34,7 @@ pub fn measure(design: &Design, simulation: &Simulation) -> Measures {
     let stress = series(simulation, &Quantity::Stress);
     let max_mpa = if design.rods.is_empty() { None } else { aggregate(&stress, Aggregate::Max, closed) };
     measures.stress = StressMeasures { max_mpa };
-    measures.gap = GapMeasures { least_mm: simulation.least_gap_mm };
+    measures.gap = GapMeasures { least_mm: aggregate(&simulation.gaps_mm, Aggregate::Min, closed) };
     measures
 }
 
@@ -89,7 +89,7 @@ fn sign(requirement: &Requirement) -> &'static str {
 
 fn unit(quantity: &Quantity) -> &'static str {
     match quantity {
-        Quantity::Error(_) => "mm",
+        Quantity::Error(_) | Quantity::Gap => "mm",
         Quantity::Stress => "MPa",
         Quantity::Torque(_) => "N·mm",
         Quantity::Force(_) => "N",
@@ -101,6 +101,7 @@ fn series(simulation: &Simulation, quantity: &Quantity) -> Vec<f64> {
     let states = &simulation.motion.states;
     match *quantity {
         Quantity::Error(trace) => simulation.errors_mm.get(trace).cloned().unwrap_or_default(),
+        Quantity::Gap => simulation.gaps_mm.clone(),
         Quantity::Stress => states.iter().map(|s| s.stress_max_mpa).collect(),
         Quantity::Torque(drive) | Quantity::Force(drive) => {
             states.iter().filter_map(|s| s.drive_loads.get(drive).map(|t| t.abs())).collect()

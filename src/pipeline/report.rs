@@ -14,7 +14,7 @@ pub struct Measures {
     pub drives: BTreeMap<String, DriveMeasures>,
     /// Of all rods.
     pub stress: StressMeasures,
-    /// Between bodies.
+    /// Between moving solids.
     pub gap: GapMeasures,
 }
 
@@ -62,10 +62,10 @@ pub struct StressMeasures {
     pub max_mpa: Option<f64>,
 }
 
-/// Distance of bodies over the cycle.
+/// Distance of the printed solids over the cycle: bodies and flexures, without what is joined by construction.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct GapMeasures {
-    /// Least distance, mm; none where not asked for.
+    /// Least distance, mm, negative where two overlap; none where there is nothing to compare.
     pub least_mm: Option<f64>,
 }
 

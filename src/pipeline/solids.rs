@@ -2,14 +2,14 @@
 
 use super::stages::Failed;
 use crate::diagnostic::Diagnostic;
-use crate::equilibrium::{Layout, Model};
+use crate::equilibrium::{Cycle, Layout, Model};
 use crate::geometry::{
-    BodySolid, Bore, Eye, Facets, FlexureSolid, Fusion, LeastGap, Member, Parts, PartsInput, build_parts,
-    least_gap,
+    BodySolid, Bore, CycleGaps, Eye, Facets, FlexureSolid, Fusion, LeastGap, Member, MovedState, Parts,
+    PartsInput, build_parts, cycle_gaps, plan_bodies,
 };
 use crate::ir::{BodyId, Design, ExportKind, Joint, JointId, JointKind, Realization};
 use crate::kinematics::Motion;
-use crate::math::Pose;
+use crate::rod::RodState;
 use nalgebra::Vector3;
 
 /// Points nearer than this are the same, mm.
@@ -109,39 +109,13 @@ fn parts_input(design: &Design, layout: &Layout, motion: &Motion, model: &Model)
             }
         })
         .collect();
-    let flexures = design
+    let flexures = model
         .rods
         .iter()
-        .zip(&model.rods)
-        .zip(&layout.rod_ends)
-        .map(|((rod, built), ends)| {
-            let rest = built.rod.rest_state();
+        .enumerate()
+        .map(|(r, built)| {
             let q = built.rod.parameters();
-            let last = rest.vertices.len() - 1;
-            // The attachment planes, and the vertices between them.
-            let mut centreline = vec![q.position_a];
-            centreline.extend_from_slice(&rest.vertices[1..last]);
-            centreline.push(q.position_b);
-            let frames: Vec<[Vector3<f64>; 2]> = (0..=last)
-                .map(|k| {
-                    let (i, j) = (k.saturating_sub(1), k.min(last - 1));
-                    let t = (rest.vertices[j + 1] - rest.vertices[i]).normalize();
-                    let m = rest.m1[i] + rest.m1[j];
-                    let m1 = (m - t * m.dot(&t)).normalize();
-                    [m1, t.cross(&m1)]
-                })
-                .collect();
-            FlexureSolid {
-                path: rod.path.clone(),
-                joint: rod.joint,
-                joint_point: ends[0].origin,
-                bodies: (rod.from.body, rod.to.body),
-                a_mm: vec![q.a; centreline.len()],
-                b_mm: vec![q.b; centreline.len()],
-                m1: frames.iter().map(|f| f[0]).collect(),
-                m2: frames.iter().map(|f| f[1]).collect(),
-                centreline,
-            }
+            flexure(design, layout, model, r, &built.rod.rest_state(), [q.position_a, q.position_b])
         })
         .collect();
     PartsInput {
@@ -153,6 +127,66 @@ fn parts_input(design: &Design, layout: &Layout, motion: &Motion, model: &Model)
         flexures,
         facets: Facets::default(),
     }
+}
+
+/// A flexure in a state, `ends` its attachment points there.
+fn flexure(
+    design: &Design,
+    layout: &Layout,
+    model: &Model,
+    index: usize,
+    state: &RodState,
+    ends: [Vector3<f64>; 2],
+) -> FlexureSolid {
+    let (rod, q) = (&design.rods[index], model.rods[index].rod.parameters());
+    let last = state.vertices.len() - 1;
+    // The attachment planes, and the vertices between them.
+    let mut centreline = vec![ends[0]];
+    centreline.extend_from_slice(&state.vertices[1..last]);
+    centreline.push(ends[1]);
+    let frames: Vec<[Vector3<f64>; 2]> = (0..=last)
+        .map(|k| {
+            let (i, j) = (k.saturating_sub(1), k.min(last - 1));
+            let t = (state.vertices[j + 1] - state.vertices[i]).normalize();
+            let m = state.m1[i] + state.m1[j];
+            let m1 = (m - t * m.dot(&t)).normalize();
+            [m1, t.cross(&m1)]
+        })
+        .collect();
+    FlexureSolid {
+        path: rod.path.clone(),
+        joint: rod.joint,
+        joint_point: layout.rod_ends[index][0].origin,
+        bodies: (rod.from.body, rod.to.body),
+        a_mm: vec![q.a; centreline.len()],
+        b_mm: vec![q.b; centreline.len()],
+        m1: frames.iter().map(|f| f[0]).collect(),
+        m2: frames.iter().map(|f| f[1]).collect(),
+        centreline,
+    }
+}
+
+/// Gaps of the planned solids over the cycle, flexures as polygons of the solver's edges (for 20 edges of 1.6 mm
+/// bent to a radius of 15 mm, 0.02 mm inside the arc); empty where there are no solids (the mesh stage says why).
+pub fn gaps(design: &Design, layout: &Layout, motion: &Motion, model: &Model, cycle: &Cycle) -> CycleGaps {
+    let Ok(plans) = plan_bodies(&parts_input(design, layout, motion, model)) else {
+        return CycleGaps::default();
+    };
+    let states: Vec<MovedState> = cycle
+        .states
+        .iter()
+        .map(|e| {
+            let poses = e.state.poses.clone();
+            let flexures = e.state.rods.iter().enumerate().map(|(r, state)| {
+                let (rod, q) = (&design.rods[r], model.rods[r].rod.parameters());
+                let ends =
+                    [poses[rod.from.body].point(&q.position_a), poses[rod.to.body].point(&q.position_b)];
+                flexure(design, layout, model, r, state, ends)
+            });
+            MovedState { flexures: flexures.collect(), poses }
+        })
+        .collect();
+    cycle_gaps(&plans, &states, |_, _| false)
 }
 
 /// A body's place among the bodies of a conventional joint: by their own layers, upwards.
@@ -176,45 +210,42 @@ fn bore(design: &Design, index: JointId, joint: &Joint, body: BodyId) -> Bore {
     }
 }
 
-/// Bodies that meet somewhere in the cycle: each pair once, at its worst state.
-pub fn collisions(design: &Design, parts: &Parts, poses: &[Vec<Pose>]) -> Vec<Diagnostic> {
-    let count = design.bodies.len();
-    let pairs: Vec<(BodyId, BodyId)> = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j))).collect();
-    let mut found = Vec::new();
-    for pair in &pairs {
-        let others: Vec<(BodyId, BodyId)> = pairs.iter().copied().filter(|p| p != pair).collect();
-        let worst = least_gap(&parts.plans, poses, &others)
-            .into_iter()
-            .flatten()
-            .min_by(|a, b| a.gap_mm.total_cmp(&b.gap_mm));
-        if let Some(worst) = worst.filter(|w| w.gap_mm < 0.0) {
-            found.push(collision(design, &worst));
-        }
-    }
-    found
+/// What meets somewhere in the cycle: each pair once, at its worst state.
+pub fn collisions(design: &Design, gaps: &CycleGaps) -> Vec<Diagnostic> {
+    gaps.overlaps.iter().map(|o| collision(design, o)).collect()
 }
 
 fn collision(design: &Design, worst: &LeastGap) -> Diagnostic {
-    let (a, b) = (&design.bodies[worst.bodies.0], &design.bodies[worst.bodies.1]);
-    let at = worst.at;
-    let message = format!("`{}` and `{}` collide on the way", a.name, b.name);
-    Diagnostic::warning("W0635", message, a.origin)
-        .label(format!(
-            "at state {} they overlap by {:.2} mm near ({:.1}, {:.1}, {:.1}) mm",
-            worst.state, -worst.gap_mm, at.x, at.y, at.z
-        ))
-        .also(b.origin, "the other one")
-        .help("put them in different layers, or aim the flexures elsewhere with `into … toward …`")
+    let ((a, at), (b, also)) = (named(design, &worst.a), named(design, &worst.b));
+    let p = worst.at;
+    let label = format!(
+        "at state {} they overlap by {:.2} mm near ({:.1}, {:.1}, {:.1}) mm",
+        worst.state, -worst.gap_mm, p.x, p.y, p.z
+    );
+    match (worst.a, worst.b) {
+        (Member::Body(_), Member::Body(_)) => {
+            Diagnostic::warning("W0635", format!("{a} and {b} collide on the way"), at)
+                .help("put them in different layers, or aim the flexures elsewhere with `into … toward …`")
+        }
+        _ => Diagnostic::warning("W0636", format!("{b} rubs against {a} on the way"), at).help(
+            "aim the flexures elsewhere with `into … toward …`, move the body's points, or narrow the bounds",
+        ),
+    }
+    .label(label)
+    .also(also, "the other one")
 }
 
-fn fusion(design: &Design, f: &Fusion) -> Diagnostic {
-    let name = |m: &Member| match *m {
+fn named(design: &Design, member: &Member) -> (String, crate::ir::Origin) {
+    match *member {
         Member::Body(b) => (format!("`{}`", design.bodies[b].name), design.bodies[b].origin),
         Member::Flexure(r) => {
             (format!("the flexure `{}`", design.rods[r].path), design.joints[design.rods[r].joint].origin)
         }
-    };
-    let ((a, at), (b, also)) = (name(&f.a), name(&f.b));
+    }
+}
+
+fn fusion(design: &Design, f: &Fusion) -> Diagnostic {
+    let ((a, at), (b, also)) = (named(design, &f.a), named(design, &f.b));
     let place = format!("near ({:.1}, {:.1}, {:.1}) mm", f.at.x, f.at.y, f.at.z);
     if f.depth_mm > 0.0 && f.same_part {
         Diagnostic::error("E0632", format!("{a} and {b} would be printed as one piece"), at)

@@ -30,8 +30,8 @@ pub struct Simulation {
     pub motion: MotionTable,
     /// Distance of each trace from its target at every state, mm.
     pub errors_mm: Vec<Vec<f64>>,
-    /// Least distance between bodies over the cycle, mm, where asked for.
-    pub least_gap_mm: Option<f64>,
+    /// Least gap of the printed solids at every state, mm; empty where there is nothing to compare.
+    pub gaps_mm: Vec<f64>,
     /// Findings that do not stop the work.
     pub diagnostics: Vec<Diagnostic>,
 }

@@ -1,11 +1,20 @@
 //! The terms of the objective, one a file. A new term is a file here and a line in [`build`].
+//!
+//! A term is a sum over the states ([`Objective`]) or a soft maximum over all of them ([`Sampled`]).
 
+mod soft_maximum;
 mod stress;
+mod sway;
+mod torque;
 mod track;
 
-use crate::equilibrium::{Equilibrium, Model, Sensitivity};
+pub use soft_maximum::{Level, Sampled};
+
+use crate::equilibrium::{Equilibrium, Layout, Model, PointForce, Sensitivity};
 use crate::ir::{Design, ObjectiveKind};
+use crate::math::skew;
 use crate::optimize::Normal;
+use nalgebra::{Matrix3xX, Vector3};
 
 /// Sums over the cycle are means times this, so that the number of steps does not change the balance
 /// of the terms; the paper's weights belong to 60 steps.
@@ -17,10 +26,20 @@ pub struct StateView<'a> {
     pub model: &'a Model<'a>,
     /// The equilibrium.
     pub equilibrium: &'a Equilibrium,
+    /// The equilibria under the load cases that [`build`] asks for.
+    pub loaded: &'a [Equilibrium],
     /// Index of the state.
     pub state: usize,
     /// Weight of this state in sums over the cycle: 60 / number of counted states.
     pub share: f64,
+}
+
+/// Derivatives of a state's equilibria.
+pub struct StatesSensitivity {
+    /// Of the equilibrium without loads.
+    pub free: Sensitivity,
+    /// Of those under each load case.
+    pub loaded: Vec<Sensitivity>,
 }
 
 /// A term of the objective, a sum over states.
@@ -30,23 +49,70 @@ pub trait Objective: Send + Sync {
     /// Contribution of one state.
     fn cost(&self, view: &StateView) -> f64;
     /// Contribution of one state with its exact derivatives.
-    fn accumulate(&self, view: &StateView, sensitivity: &Sensitivity, out: &mut Normal);
+    fn accumulate(&self, view: &StateView, at: &StatesSensitivity, out: &mut Normal);
 }
 
-/// The design's terms.
-pub fn build(design: &Design) -> Vec<Box<dyn Objective>> {
-    design
+/// A term by how it gathers the states.
+pub enum Term {
+    /// A sum over states.
+    Sum(Box<dyn Objective>),
+    /// A soft maximum over all states.
+    Peak(Box<dyn Sampled>),
+}
+
+impl Term {
+    /// As shown to the user.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Sum(o) => o.name(),
+            Self::Peak(o) => o.name(),
+        }
+    }
+}
+
+/// The design's terms, and the load cases they need: per case one force a state.
+pub fn build(design: &Design, layout: &Layout) -> (Vec<Term>, Vec<Vec<PointForce>>) {
+    let mut cases = Vec::new();
+    let terms = design
         .objectives
         .iter()
-        .map(|o| -> Box<dyn Objective> {
-            match &o.kind {
-                ObjectiveKind::Track { trace, scale_mm } => {
-                    Box::new(track::Track::new(&design.traces[*trace].name, *trace, *scale_mm, o.weight))
-                }
-                ObjectiveKind::StressBelow { bound_mpa, scale_mpa } => {
-                    Box::new(stress::StressBelow::new(*bound_mpa, *scale_mpa, o.weight))
-                }
+        .map(|o| match &o.kind {
+            ObjectiveKind::Track { trace, scale_mm } => {
+                let name = &design.traces[*trace].name;
+                Term::Sum(Box::new(track::Track::new(name, *trace, *scale_mm, o.weight)))
+            }
+            ObjectiveKind::Sway { trace, force_n, scale_mm } => {
+                let first = cases.len();
+                cases.extend(sway::load_cases(design, layout, *trace, *force_n));
+                let name = &design.traces[*trace].name;
+                let term = sway::Sway::new(name, *trace, first..cases.len(), *scale_mm, o.weight);
+                Term::Sum(Box::new(term))
+            }
+            ObjectiveKind::StressBelow { bound_mpa, scale_mpa } => {
+                Term::Sum(Box::new(stress::StressBelow::new(*bound_mpa, *scale_mpa, o.weight)))
+            }
+            ObjectiveKind::Stress { scale_mpa } => {
+                Term::Peak(Box::new(stress::StressPeak::new(*scale_mpa, o.weight)))
+            }
+            ObjectiveKind::Torque { drive, reference_n_mm } => {
+                let name = &design.drives[*drive].name;
+                Term::Peak(Box::new(torque::Torque::new(name, *drive, *reference_n_mm, o.weight)))
             }
         })
-        .collect()
+        .collect();
+    (terms, cases)
+}
+
+/// Derivatives of a body's point (rest coordinates) by the n design parameters, 3 × n; none on ground.
+fn point_rows(
+    model: &Model,
+    equilibrium: &Equilibrium,
+    sensitivity: &Sensitivity,
+    body: usize,
+    rest: &Vector3<f64>,
+) -> Option<Matrix3xX<f64>> {
+    let first = model.layout.bodies[body].first_dof?;
+    let arm = equilibrium.state.poses[body].arm(rest);
+    // δz = δu + δφ × r
+    Some(sensitivity.links.fixed_rows::<3>(first) - skew(&arm) * sensitivity.links.fixed_rows::<3>(first + 3))
 }

@@ -1,9 +1,10 @@
-//! One-sided bound on von Mises stress (Megaro et al. 2017, section 4.5, eqs. 8–15, without the soft
-//! maximum of eq. 16): ½ Σ_t Σ_rods ∫ max(0, σ_v − bound)² over length and section boundary, each rod's
-//! weights of sum one. Smooth where the paper's maximum is not, and zero for every sound design.
+//! von Mises stress (Megaro et al. 2017, section 4.5, eqs. 8–15) in two forms.
+//!
+//! [`StressBelow`], a one-sided bound: ½ Σ_t Σ_rods ∫ max(0, σ_v − bound)² over length and section boundary, each
+//! rod's weights of sum one. Smooth where the paper's maximum is not, and zero for every sound design.
+//! [`StressPeak`], in place of eq. 16: the soft maximum of σ_v over the same points, all rods and states.
 
-use super::{Objective, StateView};
-use crate::equilibrium::Sensitivity;
+use super::{Level, Objective, STEPS_OF_WEIGHTS, Sampled, StateView, StatesSensitivity};
 use crate::optimize::Normal;
 use crate::rod::{PARAMETERS, SECTION_POINTS};
 
@@ -53,23 +54,99 @@ impl Objective for StressBelow {
         cost
     }
 
-    fn accumulate(&self, view: &StateView, sensitivity: &Sensitivity, out: &mut Normal) {
-        // Summed in each rod's own directions first, then chained to the design parameters once.
-        let mut own: Vec<Option<Normal>> = vec![None; view.model.rods.len()];
+    fn accumulate(&self, view: &StateView, at: &StatesSensitivity, out: &mut Normal) {
+        let mut own = OwnDirections::new(view, at);
         self.for_each_excess(view, |rod, station, point, weight, excess| {
-            let jacobian = &sensitivity.strains[rod];
-            if let Some((_, d)) = jacobian.stress(&view.model.rods[rod].rod, station, point) {
-                let mut row = [0.0; 12 + PARAMETERS];
-                row[..12].copy_from_slice(d.link.as_slice());
-                row[12..].copy_from_slice(d.parameters.as_slice());
-                own[rod].get_or_insert_with(|| Normal::new(row.len())).add(weight, excess, &row);
-            }
+            own.with_row(rod, station, point, |normal, row| normal.add(weight, excess, row));
         });
-        for (normal, chain) in own.iter_mut().zip(&sensitivity.directions) {
+        own.chain(out);
+    }
+}
+
+/// Sums in each rod's own directions first, chained to the design parameters once.
+struct OwnDirections<'a> {
+    view: &'a StateView<'a>,
+    at: &'a StatesSensitivity,
+    rods: Vec<Option<Normal>>,
+}
+
+impl<'a> OwnDirections<'a> {
+    fn new(view: &'a StateView<'a>, at: &'a StatesSensitivity) -> Self {
+        Self { view, at, rods: vec![None; view.model.rods.len()] }
+    }
+
+    /// Calls `f(sum of the rod, gradient of the stress at the sample)`.
+    fn with_row(&mut self, rod: usize, station: usize, point: usize, f: impl FnOnce(&mut Normal, &[f64])) {
+        let jacobian = &self.at.free.strains[rod];
+        if let Some((_, d)) = jacobian.stress(&self.view.model.rods[rod].rod, station, point) {
+            let mut row = [0.0; 12 + PARAMETERS];
+            row[..12].copy_from_slice(d.link.as_slice());
+            row[12..].copy_from_slice(d.parameters.as_slice());
+            f(self.rods[rod].get_or_insert_with(|| Normal::new(row.len())), &row);
+        }
+    }
+
+    fn chain(mut self, out: &mut Normal) {
+        for (normal, chain) in self.rods.iter_mut().zip(&self.at.free.directions) {
             if let Some(normal) = normal {
                 normal.complete();
                 out.add_chained(normal, chain);
             }
         }
+    }
+}
+
+/// See the module.
+pub struct StressPeak {
+    name: String,
+    /// Weight over scale, per MPa.
+    factor: f64,
+}
+
+impl StressPeak {
+    /// `scale_mpa` is the stress that counts as one.
+    pub fn new(scale_mpa: Option<f64>, weight: f64) -> Self {
+        Self { name: "stress".to_string(), factor: weight / scale_mpa.unwrap_or(PASCAL_MPA) }
+    }
+
+    /// Calls `f(rod, station, point, stress, weight)` for every sample of a state.
+    fn for_each_sample(view: &StateView, mut f: impl FnMut(usize, usize, usize, f64, f64)) {
+        let share = view.share / STEPS_OF_WEIGHTS / (view.model.rods.len().max(1) * SECTION_POINTS) as f64;
+        for (index, (rod, strains)) in view.model.rods.iter().zip(&view.equilibrium.strains).enumerate() {
+            let weights = rod.rod.station_weights();
+            for (station, stresses) in rod.rod.stresses(strains).iter().enumerate() {
+                for (point, stress) in stresses.iter().enumerate() {
+                    f(index, station, point, *stress, share * weights[station]);
+                }
+            }
+        }
+    }
+}
+
+impl Sampled for StressPeak {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn weight(&self) -> f64 {
+        self.factor
+    }
+
+    fn samples(&self, view: &StateView, f: &mut dyn FnMut(f64, f64)) {
+        Self::for_each_sample(view, |_, _, _, stress, weight| f(stress, weight));
+    }
+
+    fn accumulate(&self, view: &StateView, at: &StatesSensitivity, level: &Level, out: &mut Normal) {
+        let mut own = OwnDirections::new(view, at);
+        Self::for_each_sample(view, |rod, station, point, stress, weight| {
+            let slope = level.slope(stress, weight);
+            if slope > 0.0 {
+                let curvature = self.factor * level.curvature(slope);
+                own.with_row(rod, station, point, |normal, row| {
+                    normal.add_model(self.factor * slope, curvature, row);
+                });
+            }
+        });
+        own.chain(out);
     }
 }

@@ -1,8 +1,6 @@
 //! Motion tracking (Megaro et al. 2017, eq. 3): ½ Σ ‖z_t − z̄_t‖², without alignment or phase shift.
 
-use super::{Objective, StateView};
-use crate::equilibrium::Sensitivity;
-use crate::math::skew;
+use super::{Objective, StateView, StatesSensitivity, point_rows};
 use crate::optimize::Normal;
 use nalgebra::Vector3;
 
@@ -39,18 +37,14 @@ impl Objective for Track {
         0.5 * self.factor * view.share * self.error_mm(view).norm_squared()
     }
 
-    fn accumulate(&self, view: &StateView, sensitivity: &Sensitivity, out: &mut Normal) {
-        let layout = view.model.layout;
-        let trace = &layout.traces[self.trace];
+    fn accumulate(&self, view: &StateView, at: &StatesSensitivity, out: &mut Normal) {
+        let trace = &view.model.layout.traces[self.trace];
         let error = self.error_mm(view);
         let weight = self.factor * view.share;
-        let Some(first) = layout.bodies[trace.body].first_dof else {
+        let Some(rows) = point_rows(view.model, view.equilibrium, &at.free, trace.body, &trace.rest) else {
             out.cost += 0.5 * weight * error.norm_squared();
             return;
         };
-        let arm = view.equilibrium.state.poses[trace.body].arm(&trace.rest);
-        // δz = δu + δφ × r
-        let rows = sensitivity.links.rows(first, 3) - skew(&arm) * sensitivity.links.rows(first + 3, 3);
         for c in 0..3 {
             let row: Vec<f64> = rows.row(c).iter().copied().collect();
             out.add(weight, error[c], &row);

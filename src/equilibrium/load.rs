@@ -1,0 +1,107 @@
+//! Dead point forces: their potential with its derivatives, and equilibria under them (the loaded states of
+//! Megaro et al. 2017, section 4.2).
+
+use super::model::{Model, State};
+use super::newton::{Equilibrium, SolveError, Solver};
+use crate::math::Pose;
+use nalgebra::{DVector, Matrix3, SMatrix, SVector, Vector3};
+
+/// Smallest part of the load that is still tried when the whole cannot be applied at once.
+const LEAST_PART: f64 = 1.0 / 64.0;
+
+/// A force that keeps its direction and size, at a point of a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointForce {
+    /// The body.
+    pub body: usize,
+    /// Where it acts, in the rest pose, mm.
+    pub rest: Vector3<f64>,
+    /// The force, N.
+    pub force_n: Vector3<f64>,
+}
+
+impl PointForce {
+    /// Potential −F·x, N·mm, zero in the rest pose.
+    pub fn potential_n_mm(&self, pose: &Pose) -> f64 {
+        -self.force_n.dot(&(pose.point(&self.rest) - self.rest))
+    }
+
+    /// Its first derivatives by the body's increments (du, dφ).
+    pub fn gradient(&self, pose: &Pose) -> SVector<f64, 6> {
+        let mut g = SVector::<f64, 6>::zeros();
+        g.fixed_rows_mut::<3>(0).copy_from(&-self.force_n);
+        g.fixed_rows_mut::<3>(3).copy_from(&-pose.arm(&self.rest).cross(&self.force_n));
+        g
+    }
+
+    /// Its second derivatives: with x = c + u + exp(φ) r, ∇²(F·x) = sym(F rᵀ) − (F·r) I in φ.
+    pub fn hessian(&self, pose: &Pose) -> SMatrix<f64, 6, 6> {
+        let r = pose.arm(&self.rest);
+        let m = self.force_n * r.transpose();
+        let turning = Matrix3::identity() * self.force_n.dot(&r) - (m + m.transpose()) * 0.5;
+        let mut h = SMatrix::<f64, 6, 6>::zeros();
+        h.fixed_view_mut::<3, 3>(3, 3).copy_from(&turning);
+        h
+    }
+}
+
+impl Solver {
+    /// The equilibrium under `loads` with the drives held at `target`, from an equilibrium without them; in
+    /// parts where the whole load moves it too far at once.
+    ///
+    /// # Errors
+    /// [`SolveError`] where no part of the load finds an equilibrium.
+    pub fn load(
+        &mut self,
+        model: &Model,
+        from: &Equilibrium,
+        target: &[f64],
+        loads: &[PointForce],
+    ) -> Result<Equilibrium, SolveError> {
+        let mut state: State = from.state.clone();
+        let (mut done, mut part) = (0.0, 1.0f64);
+        loop {
+            let next = (done + part).min(1.0);
+            let scaled: Vec<PointForce> =
+                loads.iter().map(|l| PointForce { force_n: l.force_n * next, ..*l }).collect();
+            match self.solve_loaded(model, state.clone(), target, &scaled) {
+                Ok(equilibrium) if next >= 1.0 => return Ok(equilibrium),
+                Ok(equilibrium) => {
+                    state = equilibrium.state;
+                    done = next;
+                }
+                Err(error) => {
+                    part *= 0.5;
+                    if part < LEAST_PART {
+                        return Err(error);
+                    }
+                }
+            }
+        }
+    }
+
+    /// First-order response of links and multipliers to `loads` at the last solved state.
+    pub fn response(&self, model: &Model, state: &State, loads: &[PointForce]) -> DVector<f64> {
+        let mut rhs = DVector::zeros(model.layout.dofs() + model.rows());
+        scatter_loads(model, state, loads, |first, g| {
+            let mut rows = rhs.fixed_rows_mut::<6>(first);
+            rows -= g;
+        });
+        self.solve_scaled(&mut rhs);
+        rhs
+    }
+}
+
+/// Calls `f(first unknown of the body, gradient)` for every load on a moving body.
+pub(super) fn scatter_loads(
+    model: &Model,
+    state: &State,
+    loads: &[PointForce],
+    mut f: impl FnMut(usize, SVector<f64, 6>),
+) {
+    for load in loads {
+        if let Some(first) = model.layout.bodies[load.body].first_dof {
+            f(first, load.gradient(&state.poses[load.body]));
+        }
+    }
+}

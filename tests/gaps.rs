@@ -1,0 +1,70 @@
+//! Gaps of the printed solids over the cycle of the example: measured, required, and told where they are none.
+#![allow(clippy::unwrap_used)]
+
+use flexura::elaborate::{Options, elaborate};
+use flexura::emit::lock::Lock;
+use flexura::ir::{Aggregate, Design, Quantity, Requirement};
+use flexura::pipeline::{Compiler, Simulation, Stages, check_requirements, measure};
+
+mod common;
+
+fn example() -> Design {
+    let options = Options { steps: Some(20), ..Options::default() };
+    elaborate("chebyshev.mech", &common::ExampleFiles, &options).design.unwrap()
+}
+
+fn least(simulation: &Simulation) -> f64 {
+    simulation.gaps_mm.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+fn require_gap(design: &mut Design, bound: f64) {
+    design.requirements = vec![Requirement {
+        aggregate: Aggregate::Min,
+        quantity: Quantity::Gap,
+        at_most: false,
+        strict: false,
+        bound,
+        text: "require min(gap())".into(),
+        origin: design.origin,
+    }];
+}
+
+#[test]
+fn the_solved_example_keeps_its_clearance() {
+    let mut design = example();
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/chebyshev/chebyshev.lock");
+    let lock = Lock::parse(&std::fs::read_to_string(path).unwrap(), 0).unwrap();
+    let simulation = Compiler::default().simulate(&design, &lock.start_values(&design)).unwrap();
+    assert_eq!(simulation.gaps_mm.len(), 21);
+    let gap = least(&simulation);
+    assert!(gap >= design.process.clearance_mm, "{gap}");
+    assert!(gap < 1.0, "neighbouring layers are near: {gap}");
+    assert!(
+        !simulation.diagnostics.iter().any(|d| d.code.starts_with("W063")),
+        "{:?}",
+        simulation.diagnostics
+    );
+    assert_eq!(measure(&design, &simulation).gap.least_mm, Some(gap));
+    for (bound, holds) in [(gap - 1e-3, true), (gap + 1e-3, false)] {
+        require_gap(&mut design, bound);
+        let mut found = Vec::new();
+        let result = check_requirements(&design, &simulation, &mut found);
+        assert_eq!((result[0].pass, result[0].value, result[0].unit), (holds, Some(gap), "mm"));
+        assert_eq!(found.is_empty(), holds);
+    }
+}
+
+/// The unsolved start bends a leaf into its own link: that is told with state and place.
+#[test]
+fn a_leaf_that_rubs_against_its_own_link_is_told() {
+    let design = example();
+    let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
+    let simulation = Compiler::default().simulate(&design, &start).unwrap();
+    assert!(least(&simulation) < 0.0);
+    let found: Vec<_> = simulation.diagnostics.iter().filter(|d| d.code == "W0636").collect();
+    assert!(!found.is_empty());
+    for d in found {
+        assert!(!d.is_error() && d.message.contains("rubs against"), "{}", d.message);
+        assert!(d.labels[0].text.contains("at state") && d.labels[0].text.contains("overlap by"), "{d:?}");
+    }
+}
