@@ -10,7 +10,7 @@ use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
 use crate::emit::stl::stl_bytes;
 use crate::equilibrium::{Cycle, Layout, Model, ModelError, SweepError, sweep};
-use crate::ir::{Design, Solution};
+use crate::ir::{Design, ObjectiveKind, Solution};
 use crate::kinematics::{Constraint, Motion, solve_motion};
 use crate::math::{Pose, log_so3};
 use crate::optimize::{self, Ending, Method, Problem};
@@ -125,8 +125,10 @@ impl Stages for Compiler {
             // Say why, by simulating the start once more.
             self.simulate(design, start)?;
             let message = "the optimiser has nowhere to begin: an objective cannot be computed at the start";
+            let loaded = design.objectives.iter().find(|o| matches!(o.kind, ObjectiveKind::Sway { .. }));
+            let at = loaded.map_or(design.origin, |o| o.origin);
             return Err(vec![
-                Diagnostic::error("E0611", message, design.origin)
+                Diagnostic::error("E0611", message, at)
                     .help("a `sway` force may be more than the flexures bear: give it a smaller `force`"),
             ]);
         }

@@ -25,6 +25,15 @@ pub trait Sampled: Send + Sync {
     fn accumulate(&self, view: &StateView, at: &StatesSensitivity, level: &Level, out: &mut Normal);
 }
 
+/// Hands out samples (x, w).
+type Samples<'a> = dyn Fn(&mut dyn FnMut(f64, f64)) + 'a;
+
+fn largest(samples: &Samples) -> f64 {
+    let mut largest = 0.0f64;
+    samples(&mut |x, _| largest = largest.max(x));
+    largest
+}
+
 /// A soft maximum over the cycle, as its derivatives need it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Level {
@@ -37,22 +46,21 @@ pub struct Level {
 impl Level {
     /// Largest x of the cycle: fixes β for a run.
     pub fn reference(term: &dyn Sampled, cycle: &[StateView]) -> f64 {
-        let mut largest = 0.0f64;
-        for view in cycle {
-            term.samples(view, &mut |x, _| largest = largest.max(x));
-        }
-        largest
+        largest(&|f| cycle.iter().for_each(|view| term.samples(view, f)))
     }
 
     /// The soft maximum with β = 50/`reference`.
     pub fn new(term: &dyn Sampled, cycle: &[StateView], reference: f64) -> Self {
+        Self::of(&|f| cycle.iter().for_each(|view| term.samples(view, f)), reference)
+    }
+
+    /// Of the samples (x ≥ 0, w) that `samples` hands out; 0 where there are none.
+    fn of(samples: &Samples, reference: f64) -> Self {
         let beta = SHARPNESS / reference.max(f64::MIN_POSITIVE.sqrt());
-        let largest = Self::reference(term, cycle);
+        let largest = largest(samples);
         let mut sum = 0.0;
-        for view in cycle {
-            term.samples(view, &mut |x, w| sum += w * (beta * (x - largest)).exp());
-        }
-        Self { value: largest + sum.ln() / beta, beta }
+        samples(&mut |x, w| sum += w * (beta * (x - largest)).exp());
+        Self { value: if sum > 0.0 { largest + sum.ln() / beta } else { 0.0 }, beta }
     }
 
     /// ∂S/∂x of a sample; 0 where it does not matter.
@@ -80,5 +88,50 @@ impl Level {
                 total.gauss_newton[(i, j)] -= factor * total.gradient[i] * total.gradient[j];
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn soft(samples: &[(f64, f64)]) -> Level {
+        Level::of(&|f| samples.iter().for_each(|(x, w)| f(*x, *w)), 4.0)
+    }
+
+    #[test]
+    fn it_lies_between_what_its_weights_allow() {
+        let level = soft(&[(4.0, 0.25), (1.0, 0.25), (3.9, 0.25), (0.0, 0.25)]);
+        assert!(level.value < 4.0 && level.value > 4.0 - 4.0_f64.ln() / level.beta, "{level:?}");
+        assert_eq!(soft(&[]).value, 0.0);
+        assert!((soft(&[(2.5, 0.5), (2.5, 0.5)]).value - 2.5).abs() < 1e-15);
+    }
+
+    /// The paper's form fails this: there a rising low value lowers the sum.
+    #[test]
+    fn it_rises_with_every_sample_and_slopes_are_its_derivatives() {
+        let samples = [(4.0, 0.2), (3.8, 0.3), (3.0, 0.4), (3.9, 0.1)];
+        let level = soft(&samples);
+        let slopes: Vec<f64> = samples.iter().map(|(x, w)| level.slope(*x, *w)).collect();
+        assert!((slopes.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        for (i, slope) in slopes.iter().enumerate() {
+            let at = |h: f64| {
+                let mut moved = samples;
+                moved[i].0 += h;
+                soft(&moved).value
+            };
+            assert!(at(1e-3) > level.value && *slope > 0.0);
+            let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
+            assert!((difference - slope).abs() < 1e-8, "{i}: {difference} {slope}");
+        }
+    }
+
+    #[test]
+    fn finer_sampling_changes_nothing_and_nothing_overflows() {
+        let level = soft(&[(4.0, 0.5), (3.0, 0.5)]);
+        let fine = soft(&[(4.0, 0.25), (4.0, 0.25), (3.0, 0.2), (3.0, 0.3)]);
+        assert!((level.value - fine.value).abs() < 1e-14);
+        let huge = soft(&[(1e150, 0.5), (0.0, 0.5)]);
+        assert!(huge.value.is_finite() && (huge.value / 1e150 - 1.0).abs() < 1e-12);
     }
 }
