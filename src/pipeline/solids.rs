@@ -93,6 +93,7 @@ fn parts_input(design: &Design, layout: &Layout, motion: &Motion, model: &Model)
                 joint: rod.joint,
                 joint_point: ends[0].origin,
                 bodies: (rod.from.body, rod.to.body),
+                section: built.rod.options().section,
                 a_mm: vec![q.a; centreline.len()],
                 b_mm: vec![q.b; centreline.len()],
                 m1: frames.iter().map(|f| f[0]).collect(),
