@@ -4,7 +4,7 @@
 //!
 //! `cargo test --test fea -- --nocapture` prints the tables of `docs/rod-model.md`.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use flexura::math::{Pose, log_so3};
 use flexura::rod::{
