@@ -162,7 +162,7 @@ fn chebyshev_has_its_rods_in_the_end_frames() {
             let t = v.point(end.derivative);
             assert!((t - nalgebra::Vector3::new(along * 2.0 * size, 0.0, 0.0)).norm() < 1e-12);
         }
-        let Section::Ellipse { a, b } = rod.section;
+        let [a, b] = rod.section.half_widths();
         assert_eq!(v.value(a), 0.4);
         assert!((v.value(b) - 2.9).abs() < 1e-15);
     }
@@ -336,7 +336,7 @@ fn settings_replace_parameters_and_fix_free_values() {
     assert!(!d.free.iter().any(|f| f.path == "knee.thickness" || f.path == "heel.lower.to.at.phi"));
     let v = d.exprs.evaluate(&starts(&d));
     assert_eq!(v.point(d.bodies[1].skeleton[1].position).y, 30.0);
-    let Section::Ellipse { a, .. } = d.rods[0].section;
+    let [a, _] = d.rods[0].section.half_widths();
     assert_eq!(v.value(a), 0.45);
     let p = v.point(d.rods[3].to.position);
     assert!((p.y.atan2(p.x) + 20f64.to_radians()).abs() < 1e-15);
@@ -461,7 +461,7 @@ fn expressions_have_right_derivatives() {
     let d = design(run(&text));
     let p = starts(&d);
     let v = d.exprs.evaluate(&p);
-    let Section::Ellipse { a, .. } = d.rods[2].section;
+    let [a, _] = d.rods[2].section.half_widths();
     let mut ids = vec![a];
     for r in &d.rods {
         ids.extend([r.from.position, r.from.derivative, r.to.position, r.to.derivative].concat());
@@ -489,6 +489,25 @@ fn expressions_have_right_derivatives() {
     assert!(moving > 50, "{moving}");
     let w = v.gradient(a);
     assert!(w.iter().filter(|g| **g != 0.0).count() == 2, "the section depends on q and g");
+}
+
+/// Full widths in the text, half widths in the design.
+#[test]
+fn sections_of_every_shape() {
+    let leaves = include_str!("../stdlib/flexures/crossed_leaves.mech");
+    let rect =
+        leaves.replacen("ellipse(thick = thickness, wide = wide)", "rect(wide = wide, thick = thickness)", 1);
+    let both = rect.replacen("ellipse(thick = thickness, wide = wide)", "round(thickness)", 1);
+    let main = CHEBYSHEV.replace("use std.flexures.crossed_leaves", "use \"leaves.mech\"");
+    let files = BTreeMap::from([("main.mech".to_string(), main), ("leaves.mech".to_string(), both)]);
+    let d = design(elaborate("main.mech", &files, &Options::default()));
+    let v = d.exprs.values(&starts(&d));
+    let halves = |s: &Section| s.half_widths().map(|id| v[id.0 as usize]);
+    assert!(matches!(d.rods[0].section, Section::Rect { .. }), "{:?}", d.rods[0].section);
+    assert_eq!(halves(&d.rods[0].section)[0], 0.4);
+    assert!(halves(&d.rods[0].section)[1] > 1.0);
+    assert!(matches!(d.rods[1].section, Section::Round { .. }), "{:?}", d.rods[1].section);
+    assert_eq!(halves(&d.rods[1].section), [0.4; 2]);
 }
 
 #[test]

@@ -6,10 +6,11 @@ mod chebyshev;
 use chebyshev::{BASE, CLEARANCE, COUPLER, CRANK_BODY, HEIGHT, ROCKER, THICK, chebyshev as input, poses};
 use flexura::geometry::link::Role;
 use flexura::geometry::{
-    Bore, Facets, Member, MovedState, Parts, PartsInput, Probe, build_parts, check_mesh, cycle_gaps,
-    plan_bodies,
+    Bore, Facets, FlexureSolid, Member, MovedState, Parts, PartsInput, Probe, build_parts, check_mesh,
+    cycle_gaps, plan_bodies,
 };
 use flexura::math::Pose;
+use flexura::rod::SectionShape;
 use nalgebra::Vector3;
 
 #[allow(clippy::unwrap_used)]
@@ -78,6 +79,31 @@ fn flexures_are_as_thick_as_designed() {
                 assert!(error.abs() < 0.003, "{} at station {k}: {wide:?} mm wide", flexure.path);
             }
         }
+    }
+}
+
+/// A rectangular flexure is as large as stated everywhere between its roots, and the fan of capsules that
+/// stands for it in distances holds it.
+#[test]
+fn rectangular_flexures_are_boxes() {
+    let (input, _) = build(0.0);
+    let flexure = FlexureSolid { section: SectionShape::Rectangle, ..input.flexures[0].clone() };
+    let mesh = flexure.mesh(64).rounded_to_f32();
+    assert!(check_mesh(&mesh).is_printable());
+    let probe = Probe::new(&mesh);
+    let (a, b) = flexure.end_axes(false);
+    for k in 1..flexure.centreline.len() - 1 {
+        for side in [-0.95, 0.0, 0.95] {
+            let at = flexure.centreline[k] + flexure.m2[k] * (side * b) + flexure.m1[k] * 1e-3;
+            let thick = probe.thickness_mm(&at, &flexure.m1[k]).unwrap();
+            assert!((thick / (2.0 * a) - 1.0).abs() < 0.003, "{thick}");
+        }
+    }
+    let slots = flexure.slots();
+    for (slot, k) in slots.iter().zip(0..) {
+        let corner = flexure.centreline[k] + flexure.m1[k] * a + flexure.m2[k] * b;
+        let axial = (corner - slot.start).dot(&slot.axis).clamp(-slot.half_height_mm, slot.half_height_mm);
+        assert!((corner - slot.start - slot.axis * axial).norm() <= slot.round_mm + 1e-9);
     }
 }
 

@@ -27,7 +27,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
 ];
 
 /// Functions of the target language that this version does not have.
-const LATER: &[&str] = &["sph", "angle", "rect", "path", "mirror", "turn"];
+const LATER: &[&str] = &["sph", "angle", "path", "mirror", "turn"];
 
 /// Circles that miss by less than this part of their radii touch: room for a few hundred roundings
 /// (1.1e-16 each) in the points they are drawn from.

@@ -220,7 +220,7 @@ impl<'a> Evaluator<'a> {
         let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
         let values = design.exprs.values(&start);
         for rod in &design.rods {
-            let Section::Ellipse { a, b } = rod.section;
+            let [a, b] = rod.section.half_widths();
             let ids = [rod.from.position, rod.from.derivative, rod.to.position, rod.to.derivative];
             let finite = |id: &ExprId| values.get(id.0 as usize).is_some_and(|v| v.is_finite());
             if !(ids.iter().flatten().all(finite) && finite(&a) && finite(&b)) {
@@ -280,9 +280,13 @@ fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
             end.position.iter_mut().for_each(&mut *f);
             end.derivative.iter_mut().for_each(&mut *f);
         }
-        let Section::Ellipse { a, b } = &mut r.section;
-        f(a);
-        f(b);
+        match &mut r.section {
+            Section::Ellipse { a, b } | Section::Rect { a, b } => {
+                f(a);
+                f(b);
+            }
+            Section::Round { r } => f(r),
+        }
     }
     for t in &mut design.traces {
         t.point.iter_mut().for_each(&mut *f);

@@ -397,9 +397,8 @@ impl<'a> Evaluator<'a> {
             );
         };
         let widths: &[&str] = match function.node.as_str() {
-            "ellipse" => &["thick", "wide"],
+            "ellipse" | "rect" => &["thick", "wide"],
             "round" => &["d"],
-            "rect" => return self.later(codes::LATER_TERM, "rect", function.at),
             other => {
                 let other = other.to_string();
                 return self.fail(
@@ -408,7 +407,7 @@ impl<'a> Evaluator<'a> {
                         format!("there is no section `{other}`"),
                         function.at,
                     )
-                    .help("sections are `ellipse(thick = …, wide = …)` and `round(d)`"),
+                    .help("sections are `ellipse(thick = …, wide = …)`, `rect(thick = …, wide = …)` and `round(d)`"),
                 );
             }
         };
@@ -435,8 +434,9 @@ impl<'a> Evaluator<'a> {
             semi.push(self.node(Node::Mul(id, half), e.at)?);
         }
         match semi.as_slice() {
+            [a, b] if function.node.as_str() == "rect" => Ok(Section::Rect { a: *a, b: *b }),
             [a, b] => Ok(Section::Ellipse { a: *a, b: *b }),
-            [d] => Ok(Section::Ellipse { a: *d, b: *d }),
+            [r] => Ok(Section::Round { r: *r }),
             _ => Err(Failed),
         }
     }

@@ -4,6 +4,7 @@
 use crate::ir::{BodyId, Design};
 use crate::kinematics::{Constraint, JointValue, Motion};
 use crate::math::Pose;
+use crate::rod::RodModel;
 use nalgebra::{Matrix3, Vector3};
 
 /// Orthonormal frame of a rod end in rest world coordinates: columns e1, e2, e3.
@@ -67,6 +68,8 @@ pub struct Layout {
     pub rest_poses: Vec<Pose>,
     /// A typical length: lever of rotations in scaled systems, mm.
     pub length_mm: f64,
+    /// Rod theory; the plain one unless set otherwise.
+    pub rod_model: RodModel,
 }
 
 impl Layout {
@@ -181,7 +184,17 @@ impl Layout {
 
         let closed = design.drives.iter().all(|d| d.is_closed());
         let rest_poses = rest.clone();
-        Self { bodies, rod_ends, constraints, drives, traces, closed, rest_poses, length_mm }
+        Self {
+            bodies,
+            rod_ends,
+            constraints,
+            drives,
+            traces,
+            closed,
+            rest_poses,
+            length_mm,
+            rod_model: RodModel::default(),
+        }
     }
 
     /// Number of link unknowns.

@@ -4,7 +4,10 @@
 use super::layout::Layout;
 use crate::ir::{Design, Section};
 use crate::math::Pose;
-use crate::rod::{PARAMETERS, Rod, RodError, RodMaterial, RodParameters, RodState};
+use crate::rod::{
+    PARAMETERS, RestFrames, Rod, RodError, RodMaterial, RodModel, RodOptions, RodParameters, RodState,
+    SectionShape,
+};
 use nalgebra::{DMatrix, Vector3};
 
 /// A rod between two bodies.
@@ -49,6 +52,16 @@ pub struct State {
     pub drives: Vec<f64>,
 }
 
+/// How a section of the language is modelled: wires carry frames that need no joint axis.
+fn rod_options(section: &Section, model: RodModel) -> RodOptions {
+    let (section, frames) = match section {
+        Section::Ellipse { .. } => (SectionShape::Ellipse, RestFrames::Axis),
+        Section::Rect { .. } => (SectionShape::Rectangle, RestFrames::Axis),
+        Section::Round { .. } => (SectionShape::Ellipse, RestFrames::Transport),
+    };
+    RodOptions { section, frames, corrections: model.corrections() }
+}
+
 impl<'l> Model<'l> {
     /// Builds the rods at free variables `p`, each with `edges` edges; with `derivatives` also what
     /// [`Sensitivity`](super::Sensitivity) needs of them.
@@ -86,15 +99,16 @@ impl<'l> Model<'l> {
             for c in 0..3 {
                 q[12 + c] = ends[0].axes[(c, 2)];
             }
-            let Section::Ellipse { a, b } = &rod.section;
-            for (row, id) in [(15, *a), (16, *b)] {
+            let [a, b] = rod.section.half_widths();
+            for (row, id) in [(15, a), (16, b)] {
                 q[row] = values.value(id);
                 for (column, g) in values.gradient(id).iter().enumerate() {
                     dq_dp[(row, column)] = *g;
                 }
             }
-            let build = if derivatives { Rod::with_derivatives } else { Rod::new };
-            let built = build(&RodParameters::from_array(&q), material, edges)
+            let options = rod_options(&rod.section, layout.rod_model);
+            let q = RodParameters::from_array(&q);
+            let built = Rod::with_options(&q, material, edges, options, derivatives)
                 .map_err(|error| ModelError { rod: index, error })?;
             rods.push(ModelRod { rod: built, bodies: [rod.from.body, rod.to.body], dq_dp });
         }

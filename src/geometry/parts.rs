@@ -11,6 +11,7 @@ use super::mesh::Mesh;
 use super::slot::Facets;
 use super::tidy::{SHORT_EDGE_MM, without_short_edges};
 use super::union::{BooleanError, subtract_all, union_all};
+use crate::rod::SectionShape;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::fmt;
@@ -103,6 +104,8 @@ pub struct FlexureSolid {
     pub joint_point: Vector3<f64>,
     /// Bodies at the first and the last station.
     pub bodies: (usize, usize),
+    /// Cross section; a circle is an ellipse.
+    pub section: SectionShape,
     /// Centres, the attachment points first and last.
     pub centreline: Vec<Vector3<f64>>,
     /// Thin direction at each station; m₁ × m₂ is the unit tangent.

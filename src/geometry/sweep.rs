@@ -1,9 +1,10 @@
-//! Flexures as solids: an elliptical section swept along the rest centreline (paper, section 3.3),
+//! Flexures as solids: an elliptical or rectangular section swept along the rest centreline (paper, section 3.3),
 //! carried on into the stubs at both ends so that the union there is clear of touching faces.
 
 use super::mesh::Mesh;
 use super::parts::FlexureSolid;
 use super::slot::Slot;
+use crate::rod::SectionShape;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
@@ -58,8 +59,8 @@ impl FlexureSolid {
         (pick(&self.a_mm), pick(&self.b_mm))
     }
 
-    /// The flexure as slots from station to station, each a filled fan of capsules of the ellipse's
-    /// thickness (slightly larger than the ellipse): for distances.
+    /// The flexure as slots from station to station, each a filled fan of capsules of the section's
+    /// thickness, which holds the section: for distances.
     pub fn slots(&self) -> Vec<Slot> {
         let count = self.centreline.len().min(self.m2.len()).min(self.a_mm.len()).min(self.b_mm.len());
         (1..count)
@@ -68,7 +69,11 @@ impl FlexureSolid {
                 end: self.centreline[i],
                 axis: self.m2[i - 1],
                 disc_radius_mm: 0.0,
-                half_height_mm: (self.b_mm[i] - self.a_mm[i]).max(0.0),
+                // The fan reaches round a rectangle's corners, and just to an ellipse's rim.
+                half_height_mm: match self.section {
+                    SectionShape::Ellipse => (self.b_mm[i] - self.a_mm[i]).max(0.0),
+                    SectionShape::Rectangle => self.b_mm[i],
+                },
                 round_mm: self.a_mm[i],
             })
             .collect()
@@ -76,15 +81,22 @@ impl FlexureSolid {
 
     /// The swept mesh, with its roots inside the stubs, `facets` round the section: rounded to a
     /// multiple of 4, so that both axes end in vertices and the mesh is exactly as thick as the design
-    /// (64 facets: 0.16 % less area).
+    /// (64 facets: 0.16 % less area). A rectangle has its four corners.
     pub fn mesh(&self, facets: usize) -> Mesh {
         let stations = self.stations();
-        let n = (facets / 4).max(2) * 4;
+        let boundary: Vec<(f64, f64)> = match self.section {
+            SectionShape::Ellipse => {
+                let n = (facets / 4).max(2) * 4;
+                let turn = |k: usize| (TAU * k as f64 / n as f64).sin_cos();
+                (0..n).map(turn).map(|(sin, cos)| (cos, sin)).collect()
+            }
+            SectionShape::Rectangle => vec![(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)],
+        };
+        let n = boundary.len();
         let mut mesh = Mesh::default();
         for s in &stations {
-            for k in 0..n {
-                let (sin, cos) = (TAU * k as f64 / n as f64).sin_cos();
-                mesh.vertices.push(s.center + s.m1 * (s.a * cos) + s.m2 * (s.b * sin));
+            for (x, y) in &boundary {
+                mesh.vertices.push(s.center + s.m1 * (s.a * x) + s.m2 * (s.b * y));
             }
         }
         // m1 × m2 is the direction of travel, so sections run counter-clockwise seen from the end.

@@ -220,7 +220,7 @@ pub struct RodEnd {
     pub derivative: ExprPoint,
 }
 
-/// Cross-section; semi-axes, mm. `a` along m₁ (thin, normal to the axis), `b` along m₂ (the axis).
+/// Cross-section; half widths, mm. `a` along m₁ (thin, normal to the axis), `b` along m₂ (the axis).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Section {
@@ -231,6 +231,28 @@ pub enum Section {
         /// Half the width.
         b: ExprId,
     },
+    /// Solid rectangle.
+    Rect {
+        /// Half the thickness.
+        a: ExprId,
+        /// Half the width.
+        b: ExprId,
+    },
+    /// Solid circle: a wire, whose centre line may run in any direction.
+    Round {
+        /// Radius.
+        r: ExprId,
+    },
+}
+
+impl Section {
+    /// Half widths along m₁ and m₂.
+    pub fn half_widths(&self) -> [ExprId; 2] {
+        match *self {
+            Self::Ellipse { a, b } | Self::Rect { a, b } => [a, b],
+            Self::Round { r } => [r, r],
+        }
+    }
 }
 
 /// Steps and duration: states 0..=steps at t = state / steps.

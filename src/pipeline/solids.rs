@@ -158,6 +158,7 @@ fn flexure(
         joint: rod.joint,
         joint_point: layout.rod_ends[index][0].origin,
         bodies: (rod.from.body, rod.to.body),
+        section: model.rods[index].rod.options().section,
         a_mm: vec![q.a; centreline.len()],
         b_mm: vec![q.b; centreline.len()],
         m1: frames.iter().map(|f| f[0]).collect(),

@@ -508,4 +508,37 @@ mod tests {
             }
         }
     }
+
+    /// A wire may run along the axis; its frames have no rest twist, its end is unstressed, and how its
+    /// first frame is turned changes no energy.
+    #[test]
+    fn wires_do_not_know_their_axis() {
+        let wire = RodOptions { frames: RestFrames::Transport, ..RodOptions::default() };
+        let q = RodParameters { a: 0.5, b: 0.5, ..curved() };
+        let energy = |axis: Vector3<f64>| {
+            let q = RodParameters { axis, ..q };
+            let rod = Rod::with_options(&q, MATERIAL, 14, wire, true).unwrap();
+            assert!((1..14).all(|i| rod.rest_measures[i][2].abs() < 1e-14), "{:?}", rod.rest_measures);
+            let mut system = RodSystem::new(&rod);
+            let mut state = rod.rest_state();
+            let (a, b) = (Pose::rest(Vector3::zeros()), Pose::rest(q.position_b));
+            system.assemble(&rod, &state, &a, &b);
+            system.factor();
+            assert!(system.condense().0.norm() < 1e-9);
+            let mut d = nalgebra::SVector::<f64, 12>::zeros();
+            d.fixed_rows_mut::<6>(6).copy_from_slice(&[0.3, -0.2, 0.5, 0.1, 0.2, -0.15]);
+            let inner = system.back_substitute(&d).to_vec();
+            let b = b.retract(&d.fixed_rows::<3>(6).into(), &d.fixed_rows::<3>(9).into());
+            rod.retract(&mut state, &inner, &a, &b).unwrap();
+            rod.energy(&state)
+        };
+        let want = energy(q.axis);
+        for axis in [Vector3::x() + Vector3::y(), q.derivative_a, q.position_b - q.position_a] {
+            let got = energy(axis);
+            assert!(want > 0.1 && (got / want - 1.0).abs() < 1e-9, "{got} {want}");
+        }
+        // A leaf whose axis lies along the rod has no frames.
+        let leaf = RodParameters { axis: q.derivative_a, ..q };
+        assert_eq!(Rod::new(&leaf, MATERIAL, 14).map(|_| ()), Err(RodError::AxisParallel { edge: 0 }));
+    }
 }

@@ -90,16 +90,25 @@ impl StationStrain {
 
     /// Axial and von Mises stress at a boundary point.
     fn stress(&self, point: &BoundaryPoint, e: f64, g: f64) -> (f64, f64) {
-        let (x, y) = (self.a * point.x, self.b * point.y);
+        match &point.shear {
+            None => self.ellipse_stress((point.x, point.y), e, g),
+            Some([form, ..]) => self.formed_stress((point.x, point.y), *form, e, g),
+        }
+    }
+
+    /// That of an ellipse at (a c, b s).
+    fn ellipse_stress(&self, (c, s): (f64, f64), e: f64, g: f64) -> (f64, f64) {
+        let (x, y) = (self.a * c, self.b * s);
         let axial = e * self.axial_strain(x, y);
-        let square = match &point.shear {
-            None => {
-                let [gx, gy] = self.shear_strains(x, y);
-                gx * gx + gy * gy
-            }
-            Some([form, ..]) => form * (self.twist - self.rest_twist).powi(2),
-        };
-        (axial, (axial * axial + 3.0 * g * g * square).sqrt())
+        let [gx, gy] = self.shear_strains(x, y);
+        (axial, (axial * axial + 3.0 * g * g * (gx * gx + gy * gy)).sqrt())
+    }
+
+    /// That with γ² per twist rate given, mm².
+    fn formed_stress(&self, (c, s): (f64, f64), form: f64, e: f64, g: f64) -> (f64, f64) {
+        let axial = e * self.axial_strain(self.a * c, self.b * s);
+        let shear = g * (self.twist - self.rest_twist);
+        (axial, (axial * axial + 3.0 * shear * shear * form).sqrt())
     }
 
     /// von Mises stress with its derivative by the nine station values (zero where it vanishes).
@@ -204,8 +213,14 @@ impl Rod {
     /// von Mises stresses, MPa, at the [`SECTION_POINTS`] points of every station.
     pub fn stresses(&self, strains: &[StationStrain]) -> Vec<[f64; SECTION_POINTS]> {
         let (e, g) = (self.material.e_mpa, self.material.shear_modulus_mpa());
-        let points: [BoundaryPoint; SECTION_POINTS] = std::array::from_fn(|k| self.boundary_point(k));
-        strains.iter().map(|s| std::array::from_fn(|k| s.stress(&points[k], e, g).1)).collect()
+        let points: [(f64, f64); SECTION_POINTS] = std::array::from_fn(|k| self.options.section.boundary(k));
+        match self.torsion.as_deref() {
+            None => strains.iter().map(|s| points.map(|at| s.ellipse_stress(at, e, g).1)).collect(),
+            Some(forms) => {
+                let at = |s: &StationStrain, k: usize| s.formed_stress(points[k], forms[k][0], e, g).1;
+                strains.iter().map(|s| std::array::from_fn(|k| at(s, k))).collect()
+            }
+        }
     }
 
     /// The largest von Mises stress; of equals the first.

@@ -3,6 +3,7 @@
 
 use flexura::geometry::{BodySolid, Bore, Eye, Facets, FlexureSolid, PartsInput};
 use flexura::math::Pose;
+use flexura::rod::SectionShape;
 use nalgebra::{Rotation3, Vector3};
 
 /// Height of a layer, mm.
@@ -84,6 +85,7 @@ fn leaf(
         joint,
         joint_point,
         bodies,
+        section: SectionShape::Ellipse,
         m2: vec![Vector3::z(); n + 1],
         a_mm: vec![thick / 2.0; n + 1],
         b_mm: vec![wide / 2.0; n + 1],
