@@ -54,7 +54,7 @@ fn states_by_parameters_against_differences() {
             (value(0) - 8.0 * value(1) + 8.0 * value(2) - value(3)) / (12.0 * STEP)
         };
         for (s, state) in states.iter().enumerate().skip(1) {
-            let target: Vec<f64> = layout.drives.iter().map(|d| d.values_rad[s] - d.rest_rad).collect();
+            let target: Vec<f64> = layout.drives.iter().map(|d| d.values[s] - d.rest).collect();
             let exact = workspace.at(&model, state, &target).unwrap();
             let torque = state.state.lambda[row].abs().max(1.0);
             let d = difference(&|k| shifted[k].states[s].state.lambda[row]);
@@ -82,13 +82,13 @@ fn torque_is_the_slope_of_the_energy() {
     let layout = layout(&design, &p);
     let model = Model::new(&design, &layout, &p, EDGES, false).unwrap();
     let states = sweep(&model).unwrap().states;
-    let alpha = &layout.drives[0].values_rad;
+    let alpha = &layout.drives[0].values;
     let (mut worst, mut largest) = (0.0f64, 0.0f64);
     for s in 2..steps - 1 {
         let slope = |k: usize| {
             (states[s + k].energy_n_mm - states[s - k].energy_n_mm) / (alpha[s + k] - alpha[s - k])
         };
-        let torque = states[s].torque_n_mm(&model, 0);
+        let torque = states[s].drive_load(&model, 0);
         worst = worst.max((torque - (4.0 * slope(1) - slope(2)) / 3.0).abs());
         largest = largest.max(torque.abs());
     }
