@@ -87,3 +87,52 @@ fn nothing_is_coloured_away_from_a_terminal() {
     let output = flexura(dir.path(), &["check", "none.mech"]);
     assert!(!text(&output.stderr).contains('\x1b'));
 }
+
+/// The example with five mistakes that have nothing to do with each other.
+fn five_mistakes() -> (String, Vec<(usize, &'static str)>) {
+    let text = std::fs::read_to_string(
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/chebyshev/chebyshev.mech"),
+    )
+    .unwrap();
+    let mistakes = [
+        ("let   half = 2.5 * r", "let   half = 2.5 * R", "E0101"),
+        ("point O = (0 mm, 0 mm)", "point O = (0, 0 mm)", "E0202"),
+        ("link   rocker  { B, D }", "lnik   rocker  { B, D }", "E0002"),
+        ("drive motor from 0 deg to 360 deg", "drive motor from 0 mm to 360 deg", "E0201"),
+        ("export stl", "export slt", "E0110"),
+    ];
+    let mut broken = text;
+    let mut expected = Vec::new();
+    for (right, wrong, code) in mistakes {
+        let at = broken.find(right).unwrap_or_else(|| panic!("the example no longer says {right}"));
+        expected.push((broken[..at].matches('\n').count() + 1, code));
+        broken = broken.replacen(right, wrong, 1);
+    }
+    (broken, expected)
+}
+
+#[test]
+fn five_mistakes_are_five_errors_each_at_its_place() {
+    let dir = tempfile::tempdir().unwrap();
+    let (text, expected) = five_mistakes();
+    std::fs::write(dir.path().join("five.mech"), text).unwrap();
+    for command in ["check", "build", "simulate", "ir"] {
+        let output = flexura(dir.path(), &[command, "five.mech", "--format", "json"]);
+        assert_eq!(output.status.code(), Some(1), "{command}");
+        assert!(output.stderr.is_empty(), "{command}");
+        let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let found: Vec<(usize, &str)> = value["diagnostics"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|d| {
+                assert_eq!(d["severity"], "error");
+                (d["labels"][0]["start"]["line"].as_u64().unwrap() as usize, d["code"].as_str().unwrap())
+            })
+            .collect();
+        let mut sorted = found.clone();
+        sorted.sort_unstable();
+        assert_eq!(sorted, expected, "{command}: {value:#}");
+    }
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "nothing is written");
+}

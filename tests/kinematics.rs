@@ -329,7 +329,7 @@ fn parallelogram_is_redundant_and_keeps_its_branch_through_the_change_points() {
         assert!((knee - exact).norm() < 1e-9, "state {i}: {:e}", (knee - exact).norm());
     }
     assert_eq!(motion.warnings.len(), 1, "{:#?}", motion.warnings);
-    assert_eq!(motion.warnings[0].code, "E0506");
+    assert_eq!(motion.warnings[0].code, "W0506");
     assert!(motion.warnings[0].message.contains("120.0 deg"), "{}", motion.warnings[0].message);
 }
 
@@ -515,10 +515,10 @@ fn galloping_kite_needs_two_turns_and_says_so() {
     let once = solved(&m.0);
     let codes: Vec<&str> = once.warnings.iter().map(|w| w.code.as_str()).collect();
     println!("{:#?}", once.warnings);
-    assert_eq!(codes, ["E0506", "E0507"]);
+    assert_eq!(codes, ["W0506", "W0507"]);
     m.0.drives.clear();
     m.drive(0, 0.0, 720.0, 0.0);
-    assert!(solved(&m.0).warnings.iter().all(|w| w.code == "E0506"));
+    assert!(solved(&m.0).warnings.iter().all(|w| w.code == "W0506"));
 }
 
 #[test]
@@ -667,7 +667,7 @@ proptest! {
         let worst = motion.states.iter().enumerate().map(off).fold(0.0, f64::max);
         // Close to the crossing the pose is badly conditioned: rounding over the least singular value.
         let kept = worst < 1e-6;
-        prop_assert!(kept || motion.warnings.iter().any(|w| w.code == "E0506"), "room {room}: {worst}");
+        prop_assert!(kept || motion.warnings.iter().any(|w| w.code == "W0506"), "room {room}: {worst}");
         // What is reported as crossing is indeed that close.
         prop_assert!(kept || room < 1e-3, "room {room}: {worst}");
     }

@@ -2,6 +2,7 @@
 
 use super::artefacts::{WriteError, write_atomic, write_below};
 use super::progress::Terminal;
+use super::render::tell;
 use super::sources::{Folder, read_text};
 use super::style::Style;
 use super::{Build, Common, Format, Simulate, human, render};
@@ -28,8 +29,13 @@ pub fn check(common: &Common) -> u8 {
     };
     let out = pipeline::check(&opened.request, &Compiler::default(), &opened.folder);
     render::report(&out.diagnostics, &out.sources, common.format);
-    if let (Some(design), Format::Human) = (&out.design, common.format) {
-        println!("{}: no errors", design.name);
+    if common.format == Format::Human {
+        match (&out.design, render::counts(&out.diagnostics)) {
+            (Some(design), counts) if counts.is_empty() => {
+                print(&format!("{}: no errors\n", design.name));
+            }
+            (_, counts) => tell(&format!("{}: {counts}\n", common.source.display())),
+        }
     }
     code(&out)
 }
@@ -48,7 +54,7 @@ pub fn ir(common: &Common) -> u8 {
             match serde_json::to_string_pretty(design) {
                 Ok(text) => print(&format!("{text}\n")),
                 Err(e) => {
-                    eprintln!("error: {e}");
+                    tell(&format!("error: {e}\n"));
                     FAILED
                 }
             }
@@ -117,8 +123,8 @@ pub fn build(arguments: &Build) -> u8 {
         Ok(path) => path,
         Err(why) => return finish_build(unopened(&why), common.format, &[]),
     };
-    let cancel = stop_on_ctrl_c();
     let progress = Terminal::new(common.format == Format::Human);
+    let cancel = stop_on_ctrl_c(progress.on_stop());
     let compiler = Compiler { method: arguments.optimizer.into(), iterations: arguments.iterations as usize };
     let mut out = pipeline::build(&opened.request, &compiler, &opened.folder, &progress, &cancel);
     progress.finish();
@@ -137,8 +143,11 @@ fn finish_build(out: BuildOutcome, format: Format, written: &[(String, usize)]) 
     match format {
         Format::Human => {
             render::show(&out.diagnostics, &out.sources);
-            if out.design.is_some() {
-                print(&human::report(&out, written, Style::stdout()));
+            match &out.design {
+                Some(_) => {
+                    print(&human::report(&out, written, Style::stdout()));
+                }
+                None => tell(&format!("{}\n", render::counts(&out.diagnostics))),
             }
         }
         Format::Json => {
@@ -189,16 +198,17 @@ pub fn print(text: &str) -> u8 {
 }
 
 /// Set by the first Ctrl-C; the second ends the program.
-fn stop_on_ctrl_c() -> Arc<AtomicBool> {
+fn stop_on_ctrl_c(say: impl Fn() + Send + 'static) -> Arc<AtomicBool> {
     let cancel = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&cancel);
     let handler = move || {
         if flag.swap(true, Ordering::SeqCst) {
             std::process::exit(INTERRUPTED);
         }
+        say();
     };
     if let Err(e) = ctrlc::set_handler(handler) {
-        eprintln!("warning: Ctrl-C will not keep the best point: {e}");
+        tell(&format!("warning: Ctrl-C will not keep the best point: {e}\n"));
     }
     cancel
 }

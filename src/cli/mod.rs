@@ -154,7 +154,7 @@ pub fn main() -> ExitCode {
         Some(n) => match rayon::ThreadPoolBuilder::new().num_threads(usize::from(n)).build() {
             Ok(pool) => pool.install(run),
             Err(e) => {
-                eprintln!("error: cannot start {n} threads: {e}");
+                render::tell(&format!("error: cannot start {n} threads: {e}\n"));
                 commands::FAILED
             }
         },

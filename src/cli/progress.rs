@@ -27,6 +27,16 @@ impl Terminal {
         Self { began: Instant::now(), bar }
     }
 
+    /// What to say at the first Ctrl-C; it works from any thread.
+    pub fn on_stop(&self) -> impl Fn() + Send + 'static {
+        let bar = self.bar.clone();
+        move || {
+            bar.println(
+                "stopping: the best point found is kept (Ctrl-C again ends at once and keeps nothing)",
+            )
+        }
+    }
+
     /// Takes the line away.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
@@ -49,26 +59,38 @@ impl Progress for Terminal {
     }
 
     fn iteration(&self, iteration: &Iteration) {
-        let line = iteration_line(iteration, self.seconds());
-        self.bar.println(&line);
-        self.bar.set_message(format!("optimising, iteration {}", iteration.number + 1));
+        let [heading, line] = iteration_lines(iteration, self.seconds());
+        if iteration.number == 0 {
+            self.bar.println(heading);
+        }
+        self.bar.println(line);
+        self.bar.set_message(format!(
+            "optimising, iteration {} (Ctrl-C keeps the best so far)",
+            iteration.number + 1
+        ));
     }
 }
 
-/// Iteration, objective by term, largest error, time.
-fn iteration_line(iteration: &Iteration, seconds: f64) -> String {
-    let mut line = format!("{:>4}  objective {:<11.5e}", iteration.number, iteration.objective);
+/// Heading and row: iteration, objective and its terms, largest error and stress, time.
+fn iteration_lines(iteration: &Iteration, seconds: f64) -> [String; 2] {
+    let mut lines = [String::from("iteration"), format!("{:>9}", iteration.number)];
+    let mut column = |name: &str, value: String| {
+        let width = name.chars().count().max(9);
+        lines[0].push_str(&format!("  {name:>width$}"));
+        lines[1].push_str(&format!("  {value:>width$}"));
+    };
+    column("objective", format!("{:.3e}", iteration.objective));
     for (name, value) in &iteration.terms {
-        line.push_str(&format!("  {name} {value:<10.4e}"));
+        column(name, format!("{value:.2e}"));
     }
     if let Some(error) = iteration.max_error_mm {
-        line.push_str(&format!("  error {error:8.4} mm"));
+        column("error", format!("{error:.3} mm"));
     }
     if let Some(stress) = iteration.max_stress_mpa {
-        line.push_str(&format!("  stress {stress:7.2} MPa"));
+        column("stress", format!("{stress:.1} MPa"));
     }
-    line.push_str(&format!("  {seconds:6.2} s"));
-    line
+    column("time", format!("{seconds:.1} s"));
+    lines
 }
 
 #[cfg(test)]
@@ -85,8 +107,11 @@ mod tests {
             max_stress_mpa: None,
         };
         assert_eq!(
-            iteration_line(&iteration, 1.5),
-            "   3  objective 2.50000e-1   track(tip) 2.0000e-1   error   0.5000 mm    1.50 s"
+            iteration_lines(&iteration, 1.5),
+            [
+                "iteration  objective  track(tip)      error       time",
+                "        3   2.500e-1     2.00e-1   0.500 mm      1.5 s",
+            ]
         );
     }
 }

@@ -78,6 +78,8 @@ pub struct Evaluator<'a> {
     /// The limits are exceeded: this has been said, nothing more is evaluated.
     full: bool,
     pub(super) paths: BTreeSet<String>,
+    /// Words of statements that could not be understood: such a name may have been declared there.
+    pub(super) half_said: BTreeSet<String>,
     /// Where each node is: only looked up, never listed.
     interned: HashMap<(u8, u64, u64), ExprId>,
     /// Names of the joints that slide.
@@ -104,6 +106,7 @@ impl<'a> Evaluator<'a> {
             work: 0,
             full: false,
             paths: BTreeSet::new(),
+            half_said: BTreeSet::new(),
             interned: HashMap::new(),
             sliders: BTreeSet::new(),
             starts: (Vec::new(), Vec::new()),

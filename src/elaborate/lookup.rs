@@ -52,7 +52,9 @@ impl<'a> Evaluator<'a> {
     }
 
     fn finish_unknown<T>(&mut self, d: Diagnostic, name: &Ident, candidates: &[String]) -> Outcome<T> {
-        if self.may_be_imported(d.labels.first().map_or(0, |l| l.at.file), name) {
+        if self.half_said.contains(&name.node)
+            || self.may_be_imported(d.labels.first().map_or(0, |l| l.at.file), name)
+        {
             return Err(super::eval::Failed);
         }
         if name.node.starts_with('_')
@@ -104,6 +106,9 @@ impl<'a> Evaluator<'a> {
     ) -> Outcome<usize> {
         if let Some(i) = map.get(&name.node) {
             return Ok(*i);
+        }
+        if self.half_said.contains(&name.node) {
+            return Err(super::eval::Failed);
         }
         let local = self.scopes.get(scope).and_then(|s| s.locals.get(*s.index.get(&name.node)?));
         if let Some(local) = local {

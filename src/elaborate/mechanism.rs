@@ -112,7 +112,7 @@ impl<'a> Evaluator<'a> {
             process: process?.1,
             layers: layers?,
             exports,
-            origin: m.at,
+            origin: m.name.at,
         };
         self.finish(&mut design)?;
         Some(design)

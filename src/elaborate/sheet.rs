@@ -177,7 +177,10 @@ impl<'a> Evaluator<'a> {
                 sheet.later = true;
                 let _: Result<(), _> = self.later(codes::LATER_STATEMENT, &keyword.node, keyword.at);
             }
-            StatementKind::Broken => sheet.broken = true,
+            StatementKind::Broken { words } => {
+                sheet.broken = true;
+                self.half_said.extend(words.iter().cloned());
+            }
         }
     }
 

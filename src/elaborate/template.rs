@@ -103,7 +103,7 @@ impl<'a> Evaluator<'a> {
                     );
                 }
                 StatementKind::Rod(_) => {}
-                StatementKind::Broken => ok = Err(Failed),
+                StatementKind::Broken { .. } => ok = Err(Failed),
                 StatementKind::Later { keyword } => {
                     ok = self.later(codes::LATER_STATEMENT, &keyword.node, keyword.at);
                 }

@@ -227,7 +227,7 @@ fn change_point(design: &Design, crossed: &[Vec<f64>]) -> Option<Diagnostic> {
     let message =
         format!("at `{}` = {at}{more} two ways of going on cross; the smooth one was taken", drive.name);
     Some(
-        Diagnostic::warning("E0506", message, drive.origin)
+        Diagnostic::warning("W0506", message, drive.origin)
             .label("a real mechanism may take the other way here")
             .help("change a length slightly, so that the loop never lies flat"),
     )
@@ -252,7 +252,7 @@ fn does_not_return(mechanism: &Mechanism, states: &[State]) -> Option<Diagnostic
     let drive = mechanism.design.drives.first()?;
     differs.then(|| {
         Diagnostic::warning(
-            "E0507",
+            "W0507",
             "after one cycle the mechanism is not in the pose it started from",
             drive.origin,
         )

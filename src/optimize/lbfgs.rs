@@ -2,10 +2,11 @@
 //! It knows no bounds, so it works on z with x = (1 + sin z)/2, which cannot leave the box.
 
 use super::problem::Trial;
-use super::run::Shared;
+use super::shared::Shared;
 use argmin::core::{CostFunction, Error, Gradient};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Cost given to points that cannot be simulated: finite, because argmin's line searches do not
 /// survive infinities, and far above any start.
@@ -19,12 +20,13 @@ const SIMULATIONS: usize = 2000;
 pub struct Unbounded<'a, 'd> {
     shared: &'a Shared<'d>,
     last: Mutex<Option<(Vec<f64>, Trial<'d>)>>,
+    gradients: AtomicUsize,
 }
 
 impl<'a, 'd> Unbounded<'a, 'd> {
     /// Wraps the shared problem.
     pub fn new(shared: &'a Shared<'d>) -> Self {
-        Self { shared, last: Mutex::new(None) }
+        Self { shared, last: Mutex::new(None), gradients: AtomicUsize::new(0) }
     }
 
     /// z of a point of the unit box.
@@ -68,9 +70,11 @@ impl Gradient for Unbounded<'_, '_> {
     type Gradient = Vec<f64>;
 
     fn gradient(&self, z: &Vec<f64>) -> Result<Vec<f64>, Error> {
-        let normal = self.evaluate(z, |t| t.and_then(|t| self.shared.problem.differentiate(t)))?;
-        Ok(match normal {
-            Some(normal) => z.iter().zip(normal.gradient.iter()).map(|(z, g)| 0.5 * z.cos() * g).collect(),
+        let at = self.evaluate(z, |t| t.and_then(|t| self.shared.problem.differentiate(t)))?;
+        // The line search hides its iterations; its gradients are what progress can be told by.
+        self.shared.announce(self.gradients.fetch_add(1, Ordering::Relaxed));
+        Ok(match at {
+            Some(at) => z.iter().zip(at.gradient().iter()).map(|(z, g)| 0.5 * z.cos() * g).collect(),
             None => z.iter().map(|z| z / FRAC_PI_2).collect(),
         })
     }

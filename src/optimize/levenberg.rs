@@ -2,10 +2,9 @@
 //! (Marquardt, J. SIAM 11 (1963) 431), steps from the quadratic model in the box, λ by Nielsen's rule
 //! (IMM-REP-1999-05, Technical University of Denmark).
 
-use super::box_qp::minimize_in_box;
-use super::normal::Normal;
-use super::problem::{Problem, Trial};
-use super::run::Shared;
+use super::box_qp::Quadratic;
+use super::problem::{Derivatives, Problem, Trial};
+use super::shared::Shared;
 use argmin::core::{Error, IterState, KV, Problem as Counted, Solver, TerminationReason, TerminationStatus};
 use nalgebra::DVector;
 
@@ -26,7 +25,7 @@ const ACCEPT: f64 = 1e-4;
 const FALL: f64 = 1e-3;
 /// … or by less than this part of the start: where every goal can be met the cost tends to zero and
 /// never settles relatively. On Chebyshev 1e-6 leaves 0.003 mm; 1e-8 takes four times the iterations.
-const FALL_OF_START: f64 = 1e-6;
+const FALL_OF_START: f64 = 1e-7;
 /// See [`FALL`].
 const WINDOW: usize = 5;
 
@@ -35,7 +34,7 @@ pub struct LevenbergMarquardt<'a, 'd> {
     shared: &'a Shared<'d>,
     lambda: f64,
     growth: f64,
-    current: Option<(Trial<'d>, Normal)>,
+    current: Option<(Trial<'d>, Derivatives)>,
     history: Vec<f64>,
     stuck: bool,
 }
@@ -46,17 +45,22 @@ impl<'a, 'd> LevenbergMarquardt<'a, 'd> {
         Self { shared, lambda: START, growth: 2.0, current: None, history: Vec::new(), stuck: false }
     }
 
-    /// The model's step: box around x and trust region together.
-    fn step(&self, normal: &Normal, x: &[f64]) -> Option<DVector<f64>> {
+    /// The model's step, box around x and trust region together, and the fall it promises.
+    fn step(&self, at: &Derivatives, x: &[f64]) -> Option<(DVector<f64>, f64)> {
         let n = x.len();
-        let mut a = normal.gauss_newton.clone();
-        let largest = a.diagonal().amax().max(f64::MIN_POSITIVE);
+        let b = &at.normal.gauss_newton;
+        let largest = b.diagonal().amax().max(f64::MIN_POSITIVE);
+        let mut damped = b.clone();
         for i in 0..n {
-            a[(i, i)] += self.lambda * a[(i, i)].max(FLOOR * largest);
+            damped[(i, i)] += self.lambda * b[(i, i)].max(FLOOR * largest);
         }
         let lower = DVector::from_fn(n, |i, _| (-x[i]).max(-TRUST));
         let upper = DVector::from_fn(n, |i, _| (1.0 - x[i]).min(TRUST));
-        minimize_in_box(&a, &normal.gradient, &lower, &upper)
+        let (g, hinges) = (&at.normal.gradient, &at.hinges[..]);
+        let step = Quadratic { a: &damped, g, hinges }.minimize(&lower, &upper)?;
+        let model = Quadratic { a: b, g, hinges };
+        let promised = model.value(&DVector::zeros(n)) - model.value(&step);
+        Some((step, promised))
     }
 }
 
@@ -73,12 +77,12 @@ impl<'d> Solver<&Problem<'d>, LmState> for LevenbergMarquardt<'_, 'd> {
         let x = state.take_param().unwrap_or_default();
         let trial = problem.problem("simulations", |p| Ok(p.simulate(&x)))?;
         let trial = trial.ok_or_else(|| Error::msg("the start cannot be simulated"))?;
-        let normal = problem.problem("derivatives", |p| Ok(p.differentiate(&trial)))?;
-        let normal = normal.ok_or_else(|| Error::msg("the start cannot be differentiated"))?;
+        let at = problem.problem("derivatives", |p| Ok(p.differentiate(&trial)))?;
+        let at = at.ok_or_else(|| Error::msg("the start cannot be differentiated"))?;
         self.history.push(trial.cost);
         self.shared.report(0, &trial);
-        let state = state.param(x).cost(trial.cost).gradient(normal.gradient.as_slice().to_vec());
-        self.current = Some((trial, normal));
+        let state = state.param(x).cost(trial.cost).gradient(at.gradient().as_slice().to_vec());
+        self.current = Some((trial, at));
         Ok((state, None))
     }
 
@@ -87,7 +91,7 @@ impl<'d> Solver<&Problem<'d>, LmState> for LevenbergMarquardt<'_, 'd> {
         problem: &mut Counted<&Problem<'d>>,
         state: LmState,
     ) -> Result<(LmState, Option<KV>), Error> {
-        let Some((trial, normal)) = self.current.take() else {
+        let Some((trial, at)) = self.current.take() else {
             return Err(Error::msg("not initialised"));
         };
         let mut accepted = None;
@@ -95,8 +99,7 @@ impl<'d> Solver<&Problem<'d>, LmState> for LevenbergMarquardt<'_, 'd> {
             if self.shared.cancelled() {
                 break;
             }
-            let Some(step) = self.step(&normal, &trial.x) else { break };
-            let promised = -(normal.gradient.dot(&step) + 0.5 * step.dot(&(&normal.gauss_newton * &step)));
+            let Some((step, promised)) = self.step(&at, &trial.x) else { break };
             if promised <= f64::EPSILON * trial.cost {
                 break;
             }
@@ -116,12 +119,11 @@ impl<'d> Solver<&Problem<'d>, LmState> for LevenbergMarquardt<'_, 'd> {
             self.growth *= 2.0;
         }
         self.stuck = accepted.is_none();
-        let (trial, normal) = accepted.unwrap_or((trial, normal));
+        let (trial, at) = accepted.unwrap_or((trial, at));
         self.history.push(trial.cost);
         self.shared.report(self.history.len() - 1, &trial);
-        let state =
-            state.param(trial.x.clone()).cost(trial.cost).gradient(normal.gradient.as_slice().to_vec());
-        self.current = Some((trial, normal));
+        let state = state.param(trial.x.clone()).cost(trial.cost).gradient(at.gradient().as_slice().to_vec());
+        self.current = Some((trial, at));
         Ok((state, None))
     }
 

@@ -9,8 +9,10 @@ mod normal;
 pub mod objectives;
 mod problem;
 mod run;
+mod shared;
 
-pub use box_qp::minimize_in_box;
+pub use box_qp::{Hinge, Quadratic};
 pub use normal::Normal;
-pub use problem::{Problem, Trial};
-pub use run::{Ending, Iteration, Method, Optimized, optimize};
+pub use problem::{Derivatives, Problem, Trial};
+pub use run::{Ending, Method, Optimized, optimize};
+pub use shared::Iteration;

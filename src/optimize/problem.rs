@@ -1,5 +1,6 @@
 //! The optimisation problem in the unit box: x = (p − lower) / (upper − lower).
 
+use super::box_qp::Hinge;
 use super::guards;
 use super::normal::Normal;
 use super::objectives::{self, Objective, StateView};
@@ -48,6 +49,25 @@ impl Trial<'_> {
             }
         }
         largest
+    }
+}
+
+/// Derivatives at a design point, by x.
+pub struct Derivatives {
+    /// Of the objective's terms.
+    pub normal: Normal,
+    /// Of the limits of sound rods, kept or broken.
+    pub hinges: Vec<Hinge>,
+}
+
+impl Derivatives {
+    /// Gradient of the whole cost.
+    pub fn gradient(&self) -> nalgebra::DVector<f64> {
+        let mut gradient = self.normal.gradient.clone();
+        for h in self.hinges.iter().filter(|h| h.value > 0.0) {
+            gradient.axpy(h.weight * h.value, &h.row, 1.0);
+        }
+        gradient
     }
 }
 
@@ -131,7 +151,7 @@ impl<'d> Problem<'d> {
     /// Cost, gradient and Gauss–Newton matrix by x at a simulated point; none if an equilibrium
     /// cannot be confirmed. The states are independent; their sums are formed in order, so that the
     /// result does not depend on the number of threads.
-    pub fn differentiate(&self, trial: &Trial<'d>) -> Option<Normal> {
+    pub fn differentiate(&self, trial: &Trial<'d>) -> Option<Derivatives> {
         let n = self.parameters();
         let parts: Vec<Option<Normal>> = (0..self.layout.counted_states())
             .into_par_iter()
@@ -153,14 +173,15 @@ impl<'d> Problem<'d> {
         for part in parts {
             sum.merge(&part?);
         }
-        guards::accumulate(&trial.model, &mut sum);
+        let mut hinges = guards::hinges(&trial.model);
         sum.complete();
         for (i, f) in self.design.free.iter().enumerate() {
             let width = f.upper - f.lower;
             sum.gradient[i] *= width;
             sum.gauss_newton.row_mut(i).scale_mut(width);
             sum.gauss_newton.column_mut(i).scale_mut(width);
+            hinges.iter_mut().for_each(|h| h.row[i] *= width);
         }
-        Some(sum)
+        Some(Derivatives { normal: sum, hinges })
     }
 }

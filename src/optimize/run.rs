@@ -3,12 +3,12 @@
 
 use super::lbfgs::Unbounded;
 use super::levenberg::LevenbergMarquardt;
-use super::problem::{Problem, Trial};
+use super::problem::Problem;
+use super::shared::{Iteration, Shared};
 use argmin::core::{Executor, State, TerminationReason, TerminationStatus};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// Pairs L-BFGS remembers.
 const MEMORY: usize = 10;
@@ -20,21 +20,6 @@ pub enum Method {
     LevenbergMarquardt,
     /// L-BFGS on sine-transformed variables.
     Lbfgs,
-}
-
-/// One iteration, for progress.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Iteration {
-    /// 0 is the start.
-    pub number: usize,
-    /// Weighted sum.
-    pub cost: f64,
-    /// Contribution of each term.
-    pub terms: Vec<f64>,
-    /// Largest distance of any trace from its target, mm; none without a trace.
-    pub max_error_mm: Option<f64>,
-    /// True largest von Mises stress, MPa.
-    pub max_stress_mpa: f64,
 }
 
 /// How a run ended.
@@ -65,54 +50,6 @@ pub struct Optimized {
     pub ending: Ending,
 }
 
-/// What solver, observer and caller share.
-pub struct Shared<'d> {
-    /// The problem.
-    pub problem: Problem<'d>,
-    cancel: &'d AtomicBool,
-    progress: &'d dyn Fn(&Iteration),
-    best: Mutex<Option<(f64, Vec<f64>)>>,
-    latest: Mutex<Option<Iteration>>,
-}
-
-impl<'d> Shared<'d> {
-    /// Whether the user asked to stop.
-    pub fn cancelled(&self) -> bool {
-        self.cancel.load(Ordering::Relaxed)
-    }
-
-    /// Remembers a simulated point if it is the best so far.
-    pub fn keep(&self, trial: &Trial<'d>) {
-        if let Ok(mut best) = self.best.lock()
-            && best.as_ref().is_none_or(|(cost, _)| trial.cost < *cost)
-        {
-            *best = Some((trial.cost, trial.x.clone()));
-            if let Ok(mut latest) = self.latest.lock() {
-                *latest = Some(Iteration {
-                    number: 0,
-                    cost: trial.cost,
-                    terms: trial.terms.clone(),
-                    max_error_mm: trial.max_error_mm(),
-                    max_stress_mpa: trial.max_stress_mpa(),
-                });
-            }
-        }
-    }
-
-    /// Remembers and announces an accepted iterate.
-    pub fn report(&self, number: usize, trial: &Trial<'d>) {
-        self.keep(trial);
-        self.announce(number);
-    }
-
-    fn announce(&self, number: usize) {
-        let latest = self.latest.lock().ok().and_then(|l| l.clone());
-        if let Some(latest) = latest {
-            (self.progress)(&Iteration { number, ..latest });
-        }
-    }
-}
-
 /// Minimises the design's objective from `start` (design parameters), at most `limit` iterations.
 /// `progress` is called after every iteration; `cancel` ends the run at the next step. The best
 /// point found is returned in every case; the start itself where nothing better was found.
@@ -125,12 +62,12 @@ pub fn optimize<'d>(
     progress: &'d dyn Fn(&Iteration),
 ) -> Optimized {
     let x = problem.to_unit(start);
-    let shared = Shared { problem, cancel, progress, best: Mutex::new(None), latest: Mutex::new(None) };
+    let shared = Shared::new(problem, cancel, progress);
     let (iterations, ending) = match method {
         Method::LevenbergMarquardt => levenberg_marquardt(&shared, x, limit),
         Method::Lbfgs => lbfgs(&shared, &x, limit),
     };
-    let best = shared.best.lock().ok().and_then(|b| b.clone());
+    let best = shared.best();
     let simulations = shared.problem.simulations();
     match best {
         // The start itself is returned as it was given, not through the unit box.
@@ -175,7 +112,6 @@ fn lbfgs(shared: &Shared, x: &[f64], limit: usize) -> (usize, Ending) {
     } else if shared.cancelled() {
         ending = Ending::Interrupted;
     }
-    shared.announce(done);
     (done, ending)
 }
 

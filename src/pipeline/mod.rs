@@ -136,7 +136,7 @@ pub fn simulate(
             let solution = match read_lock(request, &design, &mut out) {
                 Ok(Some((lock, LockState::Current))) => lock.solution,
                 Ok(_) if request.frozen => {
-                    out.diagnostics.push(frozen(&design));
+                    out.diagnostics.push(frozen(&design, request));
                     return None;
                 }
                 Ok(_) => start,
@@ -200,7 +200,7 @@ fn solve(
             return Some(lock.solution);
         }
         _ if request.frozen => {
-            out.diagnostics.push(frozen(design));
+            out.diagnostics.push(frozen(design, request));
             return None;
         }
         Some((lock, state)) => {
@@ -260,13 +260,12 @@ fn read_lock(
     }
 }
 
-fn frozen(design: &Design) -> Diagnostic {
-    Diagnostic::error(
-        "E0710",
-        "the lock does not belong to this design, and `--frozen` forbids solving",
-        design.origin,
-    )
-    .help("build without `--frozen` and keep the new lock")
+fn frozen(design: &Design, request: &Request) -> Diagnostic {
+    let message = match request.lock {
+        Some(_) => "the lock does not belong to this design, and `--frozen` forbids solving",
+        None => "there is no lock, and `--frozen` forbids solving",
+    };
+    Diagnostic::error("E0710", message, design.origin).help("build without `--frozen` and keep the new lock")
 }
 
 fn emit_sketches(design: &Design, out: &mut BuildOutcome) {

@@ -212,7 +212,10 @@ pub enum StatementKind {
         keyword: Ident,
     },
     /// What could not be understood; a diagnostic has been given already.
-    Broken,
+    Broken {
+        /// The words in it: names that it may have declared.
+        words: Vec<String>,
+    },
 }
 
 /// A joint statement.

@@ -12,7 +12,7 @@ impl Lower<'_> {
     pub(super) fn statement(&mut self, node: &Node) -> StatementKind {
         if node.kind == Kind::BadStatement {
             self.bad_statement(node);
-            return StatementKind::Broken;
+            return self.broken(node);
         }
         self.recovery.reset();
         match self.read_statement(node) {
@@ -21,9 +21,16 @@ impl Lower<'_> {
                 // The grammar promises these parts; a mismatch must still not pass silently.
                 let at = self.origin(node);
                 self.report(Diagnostic::error("E0001", "this statement could not be read", at));
-                StatementKind::Broken
+                self.broken(node)
             }
         }
+    }
+
+    /// What could not be understood, with the words in it.
+    fn broken(&self, node: &Node) -> StatementKind {
+        let words =
+            self.text(node).split(|c: char| !c.is_alphanumeric() && c != '_').filter(|w| !w.is_empty());
+        StatementKind::Broken { words: words.map(String::from).collect() }
     }
 
     fn read_statement(&mut self, node: &Node) -> Option<StatementKind> {
@@ -210,7 +217,7 @@ impl Lower<'_> {
         for statement in statements {
             let (fits, what) = match &statement.kind {
                 StatementKind::Param { .. } | StatementKind::Let { .. } => (true, ""),
-                StatementKind::Later { .. } | StatementKind::Broken => (true, ""),
+                StatementKind::Later { .. } | StatementKind::Broken { .. } => (true, ""),
                 StatementKind::Rod(_) => (!mechanism, "a rod belongs in a `flexure`"),
                 _ => (mechanism, "this statement belongs in a `mechanism`"),
             };
@@ -221,7 +228,7 @@ impl Lower<'_> {
                     "a flexure holds `param`, `let` and `rod` statements"
                 };
                 self.report(Diagnostic::error("E0009", what, statement.at).help(help));
-                statement.kind = StatementKind::Broken;
+                statement.kind = StatementKind::Broken { words: Vec::new() };
             }
         }
     }

@@ -16,6 +16,19 @@ impl Files for ExampleFiles {
     }
 }
 
+/// Text of a file of the Chebyshev example.
+pub fn example(name: &str) -> String {
+    ExampleFiles.read(name).unwrap()
+}
+
+/// Header and rows of a CSV table of numbers; an empty field is not a number.
+pub fn table(csv: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+    let mut lines = csv.lines();
+    let header = lines.next().unwrap().split(',').map(String::from).collect();
+    let number = |field: &str| if field.is_empty() { f64::NAN } else { field.parse().unwrap() };
+    (header, lines.map(|line| line.split(',').map(number).collect()).collect())
+}
+
 /// Every free variable moved from its start by up to a tenth of its bounds, inside them.
 pub fn shaken(design: &Design, seed: u64) -> Vec<f64> {
     let mut s = seed;
