@@ -124,7 +124,7 @@ fn work_of_the_drives_is_the_change_of_energy() {
         let (done, change, largest) = work(&part);
         println!("{}: work {done} of {change}, largest {largest} N mm", part.name);
         assert!(largest > 0.1, "{} stores nothing", part.name);
-        assert!((done - change).abs() < 2e-3 * largest, "{}: {done} {change} {largest}", part.name);
+        assert!((done - change).abs() < 1e-6 * largest, "{}: {done} {change} {largest}", part.name);
     }
 }
 
@@ -140,7 +140,7 @@ fn a_rod_that_turns_idly_does_not_disturb_the_equilibrium() {
     let gauges = layout.constraints.iter().filter(|c| matches!(c, Constraint::Gauge { .. })).count();
     assert_eq!(gauges, 1);
     let (done, change, largest) = work(&design);
-    assert!(largest > 0.1 && (done - change).abs() < 1e-4 * largest, "{done} {change} {largest}");
+    assert!(largest > 0.1 && (done - change).abs() < 1e-6 * largest, "{done} {change} {largest}");
 }
 
 /// Links and multipliers by some of the parameters, against differences of fourth order.
