@@ -11,7 +11,7 @@ import tempfile
 import vtk
 from PIL import Image
 
-COLOURS = [(0.36, 0.55, 0.72), (0.93, 0.55, 0.20), (0.50, 0.70, 0.45), (0.70, 0.55, 0.75)]
+COLOURS = [(0.55, 0.72, 0.88), (0.96, 0.62, 0.25), (0.50, 0.70, 0.45), (0.70, 0.55, 0.75)]
 VIEW_FROM = (0.55, -0.80, 1.15)
 UP = (0.0, 1.0, 0.25)
 WIDTH, HEIGHT = 1200, 1000
@@ -36,7 +36,7 @@ def draw(parts, out):
         actor.SetMapper(mapper)
         shade = actor.GetProperty()
         shade.SetColor(*COLOURS[i % len(COLOURS)])
-        shade.SetAmbient(0.18)
+        shade.SetAmbient(0.25)
         shade.SetDiffuse(0.85)
         shade.SetSpecular(0.15)
         shade.SetSpecularPower(25)

@@ -27,7 +27,8 @@ pub fn check(common: &Common) -> u8 {
         Ok(opened) => opened,
         Err(why) => return unreadable(common, &why),
     };
-    let out = pipeline::check(&opened.request, &Compiler::default(), &opened.folder);
+    let mut out = pipeline::check(&opened.request, &Compiler::default(), &opened.folder);
+    opened.name_as_written(&mut out.sources);
     render::report(&out.diagnostics, &out.sources, common.format);
     if common.format == Format::Human {
         match (&out.design, render::counts(&out.diagnostics)) {
@@ -46,7 +47,8 @@ pub fn ir(common: &Common) -> u8 {
         Ok(opened) => opened,
         Err(why) => return unreadable(common, &why),
     };
-    let out = pipeline::check(&opened.request, &Compiler::default(), &opened.folder);
+    let mut out = pipeline::check(&opened.request, &Compiler::default(), &opened.folder);
+    opened.name_as_written(&mut out.sources);
     match &out.design {
         // The output is the design: findings go to the standard error in either format.
         Some(design) => {
@@ -81,6 +83,7 @@ pub fn simulate(arguments: &Simulate) -> u8 {
     let show = Show { rigid: arguments.rigid, poses: arguments.poses };
     let (mut out, simulation) =
         pipeline::simulate(&opened.request, show, &Compiler::default(), &opened.folder);
+    opened.name_as_written(&mut out.sources);
     let to_stdout = arguments.output == Path::new("-");
     if let (Some(simulation), false) = (&simulation, to_stdout)
         && let Err(e) = write_atomic(&arguments.output, write_csv(&simulation.motion).as_bytes())
@@ -128,6 +131,7 @@ pub fn build(arguments: &Build) -> u8 {
     let compiler = Compiler { method: arguments.optimizer.into(), iterations: arguments.iterations as usize };
     let mut out = pipeline::build(&opened.request, &compiler, &opened.folder, &progress, &cancel);
     progress.finish();
+    opened.name_as_written(&mut out.sources);
     let written = match write(&out, &arguments.out, &lock_path) {
         Ok(written) => written,
         Err(e) => {
@@ -240,6 +244,15 @@ fn open(common: &Common) -> Result<Opened, (PathBuf, FileError)> {
 }
 
 impl Opened {
+    /// Gives the design's files the names by which the user can reach them: editors jump to these.
+    fn name_as_written(&self, sources: &mut SourceMap) {
+        for file in &mut sources.files {
+            if file.name.ends_with(".mech") && !file.name.starts_with("std/") {
+                file.name = self.shown.join(&file.name).display().to_string();
+            }
+        }
+    }
+
     /// Reads the lock, if there is one; returns where it belongs.
     fn read_lock(&mut self, common: &Common, out: &Path) -> Result<PathBuf, (PathBuf, FileError)> {
         let stem = self.request.source.strip_suffix(".mech").unwrap_or(&self.request.source);
@@ -247,7 +260,7 @@ impl Opened {
         let tried_out = !common.overrides.is_empty() || common.steps.is_some();
         let path = if tried_out { out.join(&name) } else { self.shown.join(&name) };
         match read_text(&path) {
-            Ok(text) => self.request.lock = Some((name, text)),
+            Ok(text) => self.request.lock = Some((path.display().to_string(), text)),
             Err(FileError::NotFound) => {}
             Err(_) if self.request.fresh => {}
             Err(e) => return Err((path, e)),

@@ -84,10 +84,10 @@ fn iteration_lines(iteration: &Iteration, seconds: f64) -> [String; 2] {
         column(name, format!("{value:.2e}"));
     }
     if let Some(error) = iteration.max_error_mm {
-        column("error", format!("{error:.3} mm"));
+        column("max error", format!("{error:.3} mm"));
     }
     if let Some(stress) = iteration.max_stress_mpa {
-        column("stress", format!("{stress:.1} MPa"));
+        column("max stress", format!("{stress:.1} MPa"));
     }
     column("time", format!("{seconds:.1} s"));
     lines
@@ -109,7 +109,7 @@ mod tests {
         assert_eq!(
             iteration_lines(&iteration, 1.5),
             [
-                "iteration  objective  track(tip)      error       time",
+                "iteration  objective  track(tip)  max error       time",
                 "        3   2.500e-1     2.00e-1   0.500 mm      1.5 s",
             ]
         );

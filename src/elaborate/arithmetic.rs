@@ -151,6 +151,10 @@ impl<'a> Evaluator<'a> {
             }
         } else if matches!((l, r), (Value::Point(_), Value::Point(_))) {
             d = d.help("the middle of two points is `A + 0.5 * (B - A)`");
+        } else if matches!((l, r), (Value::Point(_) | Value::Vector { .. }, Value::Scalar(_))) {
+            d = d.help(
+                "a length alone has no direction: write for instance `(25 mm, 0 mm)` or `(0 mm, 25 mm)`",
+            );
         } else if matches!((l, r), (Value::Vector { .. }, Value::Point(_))) {
             d = d.help("subtract a vector from a point, or two points");
         }
