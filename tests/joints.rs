@@ -100,7 +100,7 @@ fn work(design: &Design) -> (f64, f64, f64) {
             }
             i => (v(i - 2) - 8.0 * v(i - 1) + 8.0 * v(i + 1) - v(i + 2)) / 12.0,
         };
-        for i in 0..=n {
+        for (i, state) in states.iter().enumerate() {
             let weight = if i == 0 || i == n {
                 1.0
             } else if i % 2 == 1 {
@@ -108,7 +108,7 @@ fn work(design: &Design) -> (f64, f64, f64) {
             } else {
                 2.0
             };
-            done += weight / 3.0 * states[i].drive_load(&model, d) * rate(i);
+            done += weight / 3.0 * state.drive_load(&model, d) * rate(i);
         }
     }
     let energies: Vec<f64> = states.iter().map(|s| s.energy_n_mm).collect();
