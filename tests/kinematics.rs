@@ -672,3 +672,97 @@ proptest! {
         prop_assert!(kept || room < 1e-3, "room {room}: {worst}");
     }
 }
+
+/// A crank and a rocker joined by a rod with balls at both ends, its second part joined to the first as `splice` says.
+fn spliced_rod(splice: JointKind, at: V) -> Builder {
+    let mut m = Builder::new("spliced");
+    let base = m.body("base", true, 0);
+    let [crank, first, second, rocker] = ["crank", "first", "second", "rocker"].map(|n| m.body(n, false, 0));
+    let (a, b) = (V::new(0.0, 15.0, 5.0), V::new(60.0, 35.0, -5.0));
+    let motor = m.hinge("motor", [base, crank], xy(0.0, 0.0), V::z(), 0, false);
+    m.hinge("near", [crank, first], a, V::z(), 0, false);
+    m.hinge("splice", [first, second], at, (b - a).normalize(), 0, false);
+    m.hinge("far", [second, rocker], b, V::z(), 0, false);
+    m.hinge("heel", [rocker, base], xy(60.0, 0.0), V::z(), 0, false);
+    for (joint, kind) in [(1, JointKind::Ball), (2, splice), (3, JointKind::Ball)] {
+        m.0.joints[joint].kind = kind;
+    }
+    m.drive(motor, 0.0, 40.0, 0.0);
+    m.trace("tip", rocker, b);
+    m
+}
+
+#[test]
+fn idle_freedoms_of_several_bodies_are_found_by_rank() {
+    let middle = V::new(30.0, 25.0, 0.0);
+    // In one piece the two halves turn together; with a hinge along the rod each by itself.
+    for (splice, count) in [(JointKind::Fixed, 1), (JointKind::Hinge, 2)] {
+        let m = spliced_rod(splice, middle);
+        let found = mobility(&m.0);
+        assert_eq!((found.freedoms, found.undetermined, found.idle.len()), (1, 0, count), "{splice:?}");
+        let bodies: std::collections::BTreeSet<usize> =
+            found.idle.iter().flat_map(|i| i.bodies.iter().copied()).collect();
+        assert_eq!(bodies.into_iter().collect::<Vec<_>>(), [2, 3], "{splice:?}");
+        let motion = solved(&m.0);
+        assert_eq!(motion.warnings.iter().map(|w| w.code.as_str()).collect::<Vec<_>>(), ["A0508"]);
+        // The motion is that of the rod in one piece, whatever it is made of.
+        let plain = solved(&spliced_rod(JointKind::Fixed, middle).0);
+        for (a, b) in motion.states.iter().zip(&plain.states) {
+            assert!((a.traces_mm[0] - b.traces_mm[0]).norm() < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn what_moves_something_is_not_idle() {
+    // A point off the line of the balls goes round with the rod: its place is not determined.
+    let middle = V::new(30.0, 25.0, 0.0);
+    let mut m = spliced_rod(JointKind::Fixed, middle);
+    m.trace("flag", 2, V::new(30.0, 25.0, 10.0));
+    let errors = solve_motion(&m.0, &[]).unwrap_err();
+    assert_eq!(errors[0].code, "E0502");
+    assert!(errors[0].message.starts_with("mobility 2, drives 1"), "{}", errors[0].message);
+    // A third ball in the rod is a real freedom too.
+    let errors = solve_motion(&spliced_rod(JointKind::Ball, middle).0, &[]).unwrap_err();
+    assert_eq!(errors[0].code, "E0502");
+}
+
+#[test]
+fn sliders_and_cylinders_follow_their_closed_form() {
+    // Crank and slider: the block on the x axis, between a cylindrical joint and a slider in turn.
+    for kind in [JointKind::Slider, JointKind::Cylindrical] {
+        let mut m = Builder::new("engine");
+        let base = m.body("base", true, 0);
+        let [crank, rod, block] = ["crank", "rod", "block"].map(|n| m.body(n, false, 0));
+        let (r, l) = (20.0_f64, 55.0_f64);
+        let at = |degrees: f64| {
+            let pin = polar(r, degrees);
+            xy(pin.x + (l * l - pin.y * pin.y).sqrt(), 0.0)
+        };
+        let motor = m.hinge("motor", [base, crank], xy(0.0, 0.0), V::z(), 0, false);
+        m.hinge("pin", [crank, rod], polar(r, 50.0), V::z(), 0, false);
+        m.hinge("gudgeon", [rod, block], at(50.0), V::z(), 0, false);
+        let guide = m.hinge("guide", [base, block], at(50.0), V::x(), 0, false);
+        m.0.joints[guide].kind = kind;
+        m.drive(motor, 0.0, 360.0, 0.0);
+        m.trace("block", block, at(50.0));
+        let motion = solved(&m.0);
+        assert!(motion.warnings.is_empty());
+        for (i, state) in motion.states.iter().enumerate() {
+            let exact = at(50.0 + 6.0 * i as f64);
+            assert!((state.traces_mm[0] - exact).norm() < 1e-9);
+            let way = if kind == JointKind::Slider { exact.x - at(50.0).x } else { 0.0 };
+            assert!((state.joint_values[guide] - way).abs() < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn a_sliding_drive_that_goes_too_far_says_where_in_millimetres() {
+    let design = from_text("hand");
+    let mut far = design.clone();
+    far.drives[0].profile = Profile::Range { from: 0.0, to: 30.0 };
+    let errors = solve_motion(&far, &[]).unwrap_err();
+    assert_eq!(errors[0].code, "E0503");
+    assert!(errors[0].message.contains(" mm"), "{}", errors[0].message);
+}

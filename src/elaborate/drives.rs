@@ -112,7 +112,8 @@ impl<'a> Evaluator<'a> {
         let joint = self.thing(scope, &s.joint_index, text.joint, "joint");
         let unit = match joint.as_ref().ok().and_then(|j| s.joints.get(*j)) {
             Some(joint) => self.drive_unit(joint.kind, text.joint),
-            None => Err(Failed),
+            None if self.sliders.contains(&text.joint.node) => Ok(DriveUnit::Mm),
+            None => Ok(DriveUnit::Rad),
         };
         let profile = match unit {
             Ok(unit) => self.profile(scope, text.profile, unit),

@@ -49,6 +49,9 @@ impl<'a> Evaluator<'a> {
             ));
             return s;
         }
+        // Also of those that are wrong otherwise: what their drives are measured in is known all the same.
+        let sliding = sheet.joints.iter().filter(|(j, _)| j.kind.node == JointKind::Slider.name());
+        self.sliders.extend(sliding.map(|(j, _)| j.name.node.clone()));
         // The first ground body is body 0, whatever the order of the text.
         let first_ground = sheet.bodies.iter().position(|b| b.ground);
         if first_ground.is_none() && !sheet.broken && !sheet.later {
@@ -68,9 +71,6 @@ impl<'a> Evaluator<'a> {
         let planar = self.all_at_z0(scope);
         for (text, at) in &sheet.joints {
             if let Ok(joint) = self.joint(scope, &s, text, *at, planar) {
-                if joint.kind == JointKind::Slider {
-                    self.sliders.insert(joint.name.clone());
-                }
                 s.joint_index.insert(joint.name.clone(), s.joints.len());
                 s.joints.push(joint);
                 s.texts.push(text);

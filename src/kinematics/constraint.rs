@@ -107,20 +107,20 @@ impl Constraint {
         axis: &Vector3<f64>,
         second: Option<&Vector3<f64>>,
     ) -> Vec<Self> {
-        let axis = unit_or_z(axis);
-        let (n, m) = normals(&axis);
+        let unit = unit_or_z(axis);
+        let (n, m) = normals(&unit);
         let coincident = Self::Coincident { a, b, point_a: point, point_b: point };
         let on_line = Self::OnLine { a, b, point_a: point, normals_a: [n, m], point_b: point };
-        let unturned = [Self::parallel(a, b, axis), Self::Perpendicular { a, b, u_a: n, v_b: m }];
+        let unturned = [Self::parallel(a, b, unit), Self::Perpendicular { a, b, u_a: n, v_b: m }];
         match kind {
-            JointKind::Hinge => Self::hinge(a, b, point, &axis).into(),
+            JointKind::Hinge => Self::hinge(a, b, point, axis).into(),
             JointKind::Ball => vec![coincident],
             JointKind::Universal => {
-                let v_b = second.map_or(n, |s| unit_or_z(&(s - axis * s.dot(&axis))));
-                vec![coincident, Self::Perpendicular { a, b, u_a: axis, v_b }]
+                let v_b = second.map_or(n, |s| unit_or_z(&(s - unit * s.dot(&unit))));
+                vec![coincident, Self::Perpendicular { a, b, u_a: unit, v_b }]
             }
             JointKind::Slider => std::iter::once(on_line).chain(unturned).collect(),
-            JointKind::Cylindrical => vec![on_line, Self::parallel(a, b, axis)],
+            JointKind::Cylindrical => vec![on_line, Self::parallel(a, b, unit)],
             JointKind::Fixed => std::iter::once(coincident).chain(unturned).collect(),
         }
     }
