@@ -43,6 +43,13 @@
 //! links, [`RodSystem::back_substitute`], [`Rod::retract`]. At an equilibrium of a rod made by
 //! [`Rod::with_derivatives`]: [`RodSystem::parameter_columns`], [`RodSystem::internal_sensitivity`] (or, transposed,
 //! [`RodSystem::internal_pull_back`]), [`RodSystem::strain_jacobian`].
+//!
+//! # Options
+//!
+//! [`Rod::with_options`] makes rods of rectangular section, wires whose frames need no joint axis, and rods with
+//! [`Corrections`] for transverse shear, width and hindered warping; `docs/rod-model.md` holds them against
+//! three-dimensional finite elements. With shear, six internal freedoms more (`shear.rs`), nothing else changes
+//! for the caller.
 
 mod assemble;
 mod condense;
