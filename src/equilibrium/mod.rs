@@ -9,6 +9,7 @@ mod layout;
 mod load;
 mod model;
 mod newton;
+mod saddle;
 mod sensitivity;
 mod sweep;
 

@@ -1,21 +1,19 @@
-//! Newton's method on the total potential with constraints: rod by rod condensation, one small
-//! saddle-point system for links and multipliers, full steps first.
+//! Newton's method on the total potential with constraints, full steps first.
 
 use super::load::{PointForce, scatter_loads};
 use super::model::{Model, State};
+use super::saddle::{gather, scatter};
 use crate::ir::DriveUnit;
-use crate::kinematics::{Constraint, Jacobian};
+use crate::kinematics::Jacobian;
 use crate::math::Ldlt;
 use crate::rod::{RodSystem, StationStrain};
-use nalgebra::{DMatrix, DVector, SVector};
+use nalgebra::DVector;
 
 /// Relative residual of an accepted state, against the largest internal force
 /// (`RESIDUAL · F*`; reached in the last quadratic step, typically 1e-11 to 1e-13).
 const RESIDUAL: f64 = 1e-9;
 /// Constraints of an accepted state, mm (levers times radians for directions and angles).
 const CONSTRAINT_MM: f64 = 1e-9;
-/// Lower-right regularisation δ = this · ‖J‖²/‖H‖ for redundant rows (1e-12 to 1e-8 give the same states).
-const REDUNDANCY: f64 = 1e-10;
 /// Newton iterations before a step counts as failed. Accepted steps take 2 to 8.
 const ITERATIONS: usize = 40;
 /// Largest rotation of a link in one iteration, rad: beyond it the chart's linearisation is poor.
@@ -72,9 +70,9 @@ pub struct Solver {
     pub(super) factors: Option<Ldlt>,
     pub(super) scale: DVector<f64>,
     pub(super) rods_positive: bool,
-    jacobian: Jacobian,
+    pub(super) jacobian: Jacobian,
     /// Of the last solution asked for.
-    loads: Vec<PointForce>,
+    pub(super) loads: Vec<PointForce>,
 }
 
 /// Sizes of what is not yet in balance.
@@ -203,114 +201,6 @@ impl Solver {
         Residual { force_n, constraint_mm, tolerance_n }
     }
 
-    /// Calls `f(row, bodies, λ, residual, scale, gradient)` for every constraint and drive row.
-    fn for_each_row(
-        &mut self,
-        model: &Model,
-        state: &State,
-        target: &[f64],
-        mut f: impl FnMut(usize, [usize; 2], f64, f64, f64, &SVector<f64, 12>),
-    ) {
-        let n = model.layout.dofs();
-        let mut row = 0;
-        let mut residual = [0.0; Constraint::MAX_ROWS];
-        for c in &model.layout.constraints {
-            c.residual(&state.poses, &mut residual);
-            c.jacobian(&state.poses, &mut self.jacobian);
-            for (r, value) in residual.iter().enumerate().take(c.rows()) {
-                let mut gradient = SVector::<f64, 12>::zeros();
-                for k in 0..6 {
-                    gradient[k] = self.jacobian.a[(r, k)];
-                    gradient[6 + k] = self.jacobian.b[(r, k)];
-                }
-                f(row, c.bodies(), state.lambda[row], *value, self.scale[n + row], &gradient);
-                row += 1;
-            }
-        }
-        for (i, drive) in model.layout.drives.iter().enumerate() {
-            let value = drive.joint.value(&state.poses, state.drives[i]);
-            let gradient = drive.joint.gradient(&state.poses);
-            f(
-                row,
-                drive.joint.bodies(),
-                state.lambda[row],
-                value - target[i],
-                self.scale[n + row],
-                &gradient,
-            );
-            row += 1;
-        }
-    }
-
-    /// Condenses the rods and factors the scaled saddle-point matrix. With `exact` nothing is
-    /// shifted, and the answer says whether the state is a strict minimum; otherwise rods and links
-    /// are shifted until the step is one of descent.
-    fn factor(&mut self, model: &Model, state: &State, exact: bool) -> bool {
-        let n = model.layout.dofs();
-        let m = model.rows();
-        let mut k = DMatrix::<f64>::zeros(n + m, n + m);
-        self.rods_positive = true;
-        for (rod, system) in model.rods.iter().zip(&mut self.systems) {
-            let report = if exact { system.factor_unshifted() } else { system.factor() };
-            self.rods_positive &= report.negative_pivots == 0;
-            let (_, hessian) = system.condense();
-            scatter_matrix(model, rod.bodies, hessian, &mut k);
-        }
-        let mut row = 0;
-        for c in &model.layout.constraints {
-            let lambda = &state.lambda[row..row + c.rows()];
-            scatter_matrix(model, c.bodies(), &c.hessian(&state.poses, lambda), &mut k);
-            row += c.rows();
-        }
-        for (i, drive) in model.layout.drives.iter().enumerate() {
-            let h = drive.joint.hessian(&state.poses) * state.lambda[row + i];
-            scatter_matrix(model, drive.joint.bodies(), &h, &mut k);
-        }
-        for load in &self.loads {
-            if let Some(first) = model.layout.bodies[load.body].first_dof {
-                let mut block = k.fixed_view_mut::<6, 6>(first, first);
-                block += load.hessian(&state.poses[load.body]);
-            }
-        }
-        let target: Vec<f64> = state.drives.clone();
-        self.for_each_row(model, state, &target, |row, bodies, _, _, _, gradient| {
-            for (half, body) in bodies.into_iter().enumerate() {
-                if let Some(first) = model.layout.bodies[body].first_dof {
-                    for c in 0..6 {
-                        k[(n + row, first + c)] += gradient[6 * half + c];
-                    }
-                }
-            }
-        });
-        for i in 0..n + m {
-            for j in 0..=i {
-                k[(i, j)] *= self.scale[i] * self.scale[j];
-            }
-        }
-        let h_norm = (0..n).map(|i| k[(i, i)].abs()).fold(f64::MIN_POSITIVE, f64::max);
-        let j_norm =
-            (n..n + m).flat_map(|i| (0..n).map(move |j| (i, j))).map(|ij| k[ij].abs()).fold(0.0, f64::max);
-        for i in n..n + m {
-            k[(i, i)] = -REDUNDANCY * j_norm * j_norm / h_norm;
-        }
-        let mut factors = Ldlt::new(k.clone());
-        let minimum = |f: &Ldlt| f.inertia().negative == m && f.inertia().zero == 0;
-        let stable = minimum(&factors) && self.rods_positive;
-        if !exact {
-            let mut shift = 1e-4 * h_norm;
-            while !minimum(&factors) && shift < 1e6 * h_norm {
-                let mut shifted = k.clone();
-                for i in 0..n {
-                    shifted[(i, i)] += shift;
-                }
-                factors = Ldlt::new(shifted);
-                shift *= 10.0;
-            }
-        }
-        self.factors = Some(factors);
-        stable
-    }
-
     /// Right-hand side of the scaled system for a full Newton step, and its solution: link
     /// increments, then the change of the multipliers.
     fn newton_step(&mut self, model: &Model, state: &State, target: &[f64]) -> DVector<f64> {
@@ -333,15 +223,6 @@ impl Solver {
         }
         self.solve_scaled(&mut rhs);
         rhs
-    }
-
-    /// Solves the factored system for one unscaled right-hand side in place.
-    pub(super) fn solve_scaled(&self, rhs: &mut DVector<f64>) {
-        rhs.component_mul_assign(&self.scale);
-        if let Some(f) = &self.factors {
-            f.solve_column(rhs.as_mut_slice());
-        }
-        rhs.component_mul_assign(&self.scale);
     }
 
     /// Derivative of links and multipliers by drive value `drive` at the last solved state.
@@ -394,50 +275,6 @@ impl Solver {
             fraction *= 0.5;
         }
         Err(SolveError::NotConverged)
-    }
-}
-
-/// Adds a 12-vector of two bodies into the link vector.
-pub(super) fn scatter(model: &Model, bodies: [usize; 2], v: &SVector<f64, 12>, out: &mut DVector<f64>) {
-    for (half, body) in bodies.into_iter().enumerate() {
-        if let Some(first) = model.layout.bodies[body].first_dof {
-            for c in 0..6 {
-                out[first + c] += v[6 * half + c];
-            }
-        }
-    }
-}
-
-/// The increments of two bodies out of the link vector; zero for ground.
-pub(super) fn gather(model: &Model, bodies: [usize; 2], v: &DVector<f64>) -> SVector<f64, 12> {
-    let mut out = SVector::zeros();
-    for (half, body) in bodies.into_iter().enumerate() {
-        if let Some(first) = model.layout.bodies[body].first_dof {
-            for c in 0..6 {
-                out[6 * half + c] = v[first + c];
-            }
-        }
-    }
-    out
-}
-
-fn scatter_matrix(
-    model: &Model,
-    bodies: [usize; 2],
-    h: &nalgebra::SMatrix<f64, 12, 12>,
-    out: &mut DMatrix<f64>,
-) {
-    let first = bodies.map(|b| model.layout.bodies[b].first_dof);
-    for (i, row) in first.iter().enumerate() {
-        for (j, column) in first.iter().enumerate() {
-            if let (Some(row), Some(column)) = (row, column) {
-                for r in 0..6 {
-                    for c in 0..6 {
-                        out[(row + r, column + c)] += h[(6 * i + r, 6 * j + c)];
-                    }
-                }
-            }
-        }
     }
 }
 
