@@ -4,28 +4,6 @@
 use crate::ir::expr::{ExprGraph, ExprId, Node};
 use std::collections::BTreeSet;
 
-fn operands(node: &Node) -> [Option<ExprId>; 2] {
-    match *node {
-        Node::Const(_) | Node::Free(_) => [None, None],
-        Node::Neg(a)
-        | Node::Powi(a, _)
-        | Node::Sqrt(a)
-        | Node::Sin(a)
-        | Node::Cos(a)
-        | Node::Tan(a)
-        | Node::Asin(a)
-        | Node::Acos(a)
-        | Node::Abs(a) => [Some(a), None],
-        Node::Add(a, b)
-        | Node::Sub(a, b)
-        | Node::Mul(a, b)
-        | Node::Div(a, b)
-        | Node::Atan2(a, b)
-        | Node::Min(a, b)
-        | Node::Max(a, b) => [Some(a), Some(b)],
-    }
-}
-
 fn with_operands(node: &Node, f: impl Fn(ExprId) -> ExprId) -> Node {
     match *node {
         Node::Const(v) => Node::Const(v),
@@ -64,7 +42,7 @@ fn reachable(graph: &ExprGraph, roots: &[ExprId]) -> Vec<bool> {
         if seen.get(i).copied().unwrap_or(false)
             && let Some(node) = graph.nodes.get(i)
         {
-            for id in operands(node).into_iter().flatten() {
+            for id in node.operands().into_iter().flatten() {
                 mark(&mut seen, id);
             }
         }

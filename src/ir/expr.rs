@@ -50,6 +50,31 @@ pub enum Node {
     Abs(ExprId),
 }
 
+impl Node {
+    /// Operands, none for a number or a variable.
+    pub fn operands(&self) -> [Option<ExprId>; 2] {
+        match *self {
+            Node::Const(_) | Node::Free(_) => [None, None],
+            Node::Neg(a)
+            | Node::Powi(a, _)
+            | Node::Sqrt(a)
+            | Node::Sin(a)
+            | Node::Cos(a)
+            | Node::Tan(a)
+            | Node::Asin(a)
+            | Node::Acos(a)
+            | Node::Abs(a) => [Some(a), None],
+            Node::Add(a, b)
+            | Node::Sub(a, b)
+            | Node::Mul(a, b)
+            | Node::Div(a, b)
+            | Node::Atan2(a, b)
+            | Node::Min(a, b)
+            | Node::Max(a, b) => [Some(a), Some(b)],
+        }
+    }
+}
+
 /// Nodes in topological order; constants are folded and equal nodes shared.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ExprGraph {
@@ -114,7 +139,7 @@ impl ExprGraph {
 
     /// The node itself, or the constant it comes to when its operands are constant.
     pub(crate) fn fold(&self, node: Node) -> Node {
-        let operands = operands(&node);
+        let operands = node.operands();
         if matches!(node, Node::Const(_) | Node::Free(_)) {
             return node;
         }
@@ -142,7 +167,7 @@ impl ExprGraph {
                 Node::Const(v) => *v,
                 Node::Free(i) => p[*i as usize],
                 _ => {
-                    let [a, b] = operands(node);
+                    let [a, b] = node.operands();
                     let a = a.map_or(0.0, |id| out[id.0 as usize]);
                     let b = b.map_or(0.0, |id| out[id.0 as usize]);
                     apply(node, a, b)
@@ -164,7 +189,7 @@ impl ExprGraph {
                 out[*k as usize] = 1.0;
                 continue;
             }
-            let ids = operands(node);
+            let ids = node.operands();
             let x = ids[0].map_or(0.0, |id| values[id.0 as usize]);
             let y = ids[1].map_or(0.0, |id| values[id.0 as usize]);
             let partial = partials(node, x, y, values[i]);
@@ -187,28 +212,6 @@ fn same(a: &Node, b: &Node) -> bool {
     match (a, b) {
         (Node::Const(x), Node::Const(y)) => x.to_bits() == y.to_bits(),
         _ => a == b,
-    }
-}
-
-fn operands(node: &Node) -> [Option<ExprId>; 2] {
-    match *node {
-        Node::Const(_) | Node::Free(_) => [None, None],
-        Node::Neg(a)
-        | Node::Powi(a, _)
-        | Node::Sqrt(a)
-        | Node::Sin(a)
-        | Node::Cos(a)
-        | Node::Tan(a)
-        | Node::Asin(a)
-        | Node::Acos(a)
-        | Node::Abs(a) => [Some(a), None],
-        Node::Add(a, b)
-        | Node::Sub(a, b)
-        | Node::Mul(a, b)
-        | Node::Div(a, b)
-        | Node::Atan2(a, b)
-        | Node::Min(a, b)
-        | Node::Max(a, b) => [Some(a), Some(b)],
     }
 }
 
