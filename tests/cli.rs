@@ -136,3 +136,18 @@ fn five_mistakes_are_five_errors_each_at_its_place() {
     }
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "nothing is written");
 }
+
+/// An output folder that is a file: nothing is lost, and the reason is told.
+#[test]
+fn what_cannot_be_written_is_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/chebyshev/chebyshev.mech");
+    std::fs::write(dir.path().join("taken"), "mine").unwrap();
+    let output = flexura(dir.path(), &["build", source, "--frozen", "--out", "taken", "--format", "json"]);
+    assert_eq!(output.status.code(), Some(1));
+    let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let codes: Vec<&str> =
+        value["diagnostics"].as_array().unwrap().iter().map(|d| d["code"].as_str().unwrap()).collect();
+    assert_eq!(codes, ["E0731"], "{value:#}");
+    assert_eq!(std::fs::read_to_string(dir.path().join("taken")).unwrap(), "mine");
+}
