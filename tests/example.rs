@@ -6,7 +6,9 @@ mod common;
 
 use common::{ExampleFiles, example, table};
 use flexura::elaborate::{FileError, Files};
-use flexura::geometry::{Mesh, check_mesh};
+use flexura::equilibrium::{Layout, Model};
+use flexura::geometry::{Mesh, Probe, check_mesh};
+use flexura::kinematics::solve_motion;
 use flexura::pipeline::{
     self, Artefact, BuildOutcome, Compiler, Iteration, Origin, Progress, Request, Show, build,
 };
@@ -139,6 +141,38 @@ fn the_solids_it_gives() {
         }
     }
     snapshot("solids", &text);
+}
+
+/// Thickness and width of every leaf, measured on the emitted file, against the solved design's.
+#[test]
+fn the_leaves_of_the_part_are_as_thick_as_the_design_says() {
+    /// Relative; a section's polygon is scaled to its semi-axes, so what is left is the curve between stations and
+    /// single precision: 0.3 % measured.
+    const TOLERANCE: f64 = 5e-3;
+    let design = solved().design.as_ref().unwrap();
+    let values = &solved().solution.as_ref().unwrap().values;
+    let p: Vec<f64> = design.free.iter().map(|f| values[&f.path]).collect();
+    let layout = Layout::new(design, &solve_motion(design, &p).unwrap(), &p);
+    let model = Model::new(design, &layout, &p, 48, false).unwrap();
+    let base = solved().artefacts.iter().find(|a| a.name.ends_with("_base.stl")).unwrap();
+    let mesh = read_stl(&base.bytes);
+    let probe = Probe::new(&mesh);
+    for (rod, built) in design.rods.iter().zip(&model.rods) {
+        let (rest, q) = (built.rod.rest_state(), built.rod.parameters());
+        for k in [14, 20, 24, 28, 34] {
+            let (from, to) = (rest.vertices[k], rest.vertices[k + 1]);
+            let t = (to - from).normalize();
+            let (m1, middle) = (rest.m1[k], (from + to) / 2.0);
+            // Off the axis of symmetry by a hair, so that no ray runs along an edge of the mesh.
+            let middle = middle + (t + t.cross(&m1)) * 1e-3;
+            for (direction, wanted) in [(m1, 2.0 * q.a), (t.cross(&m1), 2.0 * q.b)] {
+                let measured = probe.thickness_mm(&middle, &direction).unwrap();
+                let relative = measured / wanted - 1.0;
+                assert!(relative.abs() < TOLERANCE, "{} at edge {k}: {measured} mm, {wanted}", rod.path);
+            }
+        }
+        assert!(2.0 * q.a >= design.process.least_wall_mm);
+    }
 }
 
 fn read_stl(bytes: &[u8]) -> Mesh {
