@@ -7,7 +7,8 @@ use crate::kinematics::Constraint;
 use crate::math::Ldlt;
 use nalgebra::{DMatrix, DVector, SVector};
 
-/// Lower-right regularisation δ = this · ‖J‖²/‖H‖ for redundant rows (1e-12 to 1e-8 give the same states).
+/// Lower-right regularisation δ = this · ‖J‖²/‖H‖ for redundant rows. 1e-12, 1e-10 and 1e-8 pass the same tests of
+/// states, work and sensitivities, mechanisms with redundant rows and idle freedoms among them.
 const REDUNDANCY: f64 = 1e-10;
 
 impl Solver {

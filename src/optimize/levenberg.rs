@@ -24,7 +24,8 @@ const ACCEPT: f64 = 1e-4;
 /// The run ends when the cost falls by less than this part of itself over [`WINDOW`] iterations …
 const FALL: f64 = 1e-3;
 /// … or by less than this part of the start: where every goal can be met the cost tends to zero and
-/// never settles relatively. On Chebyshev 1e-6 leaves 0.003 mm; 1e-8 takes four times the iterations.
+/// never settles relatively. On Chebyshev 1e-6 ends after 15 iterations at 0.011 mm, 1e-7 after 29 at
+/// 0.003 mm; without it 100 are not enough.
 const FALL_OF_START: f64 = 1e-7;
 /// See [`FALL`].
 const WINDOW: usize = 5;
