@@ -99,6 +99,7 @@ impl Builder {
             unit: DriveUnit::Rad,
             profile: Profile::Range { from: from_deg.to_radians(), to: to_deg.to_radians() },
             rest: rest_deg.to_radians(),
+            free_rest: None,
             motor: None,
             continuous: true,
             origin: origin(3, id),

@@ -69,7 +69,6 @@ codes! {
     LATER_STATEMENT "E0901" "a statement that is not available yet";
     LATER_TERM "E0902" "an objective, query, export or function that is not available yet";
     LATER_JOINT "E0903" "a kind of joint that is not available yet";
-    LATER_FREE "E0904" "a `free` that is not available yet where it acts";
     UNUSED_IMPORT "W0101" "an import that is not used";
     IDLE_FREE "W0201" "a `free` value that nothing depends on";
 }

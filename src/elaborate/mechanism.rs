@@ -10,7 +10,7 @@ use super::terms::Named;
 use super::value::ItemRef;
 use crate::diagnostic::{Diagnostic, Origin, SourceMap};
 use crate::ir::expr::ExprId;
-use crate::ir::{Design, Drive, ExprPoint, Process, Realization, Rod, Section};
+use crate::ir::{Design, Drive, Process, Realization, Rod, Section};
 use crate::syntax::ast::Mechanism;
 use std::collections::BTreeMap;
 
@@ -93,8 +93,6 @@ impl<'a> Evaluator<'a> {
         for e in &sheet.exports {
             exports.extend(self.export(scope, e, &driven, &sheet.drives));
         }
-        let geometry = geometry_of(&s, &traces);
-        self.check_fixed_geometry(&geometry);
         if self.out.iter().any(Diagnostic::is_error) {
             return None;
         }
@@ -171,34 +169,12 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// The numerical stages differentiate flexures only: points must not be free for now.
-    fn check_fixed_geometry(&mut self, geometry: &[(ExprPoint, Origin)]) {
-        let mut reported = std::collections::BTreeSet::new();
-        for (p, place) in geometry {
-            for i in graph::free_variables(&self.exprs, p) {
-                if reported.insert(i)
-                    && let Some(f) = self.free.get(i)
-                {
-                    let d = Diagnostic::error(
-                        codes::LATER_FREE,
-                        "a free value that moves points of the mechanism is not available yet",
-                        f.origin,
-                    )
-                    .label(format!("`{}` is free", f.path))
-                    .also(*place, "this depends on it")
-                    .help("write a number here; values inside flexures can be free");
-                    self.out.push(d);
-                }
-            }
-        }
-    }
-
     /// Drops what the design does not use from the graph, and checks what is left at the start values.
     fn finish(&mut self, design: &mut Design) -> Option<()> {
         let mut roots = Vec::new();
         each_expr(design, &mut |id| roots.push(*id));
         let (exprs, place) = graph::prune(&self.exprs, &roots);
-        let used = graph::free_variables(&self.exprs, &roots);
+        let used = self.exprs.free_variables(&roots);
         for (i, f) in design.free.iter().enumerate() {
             if !used.contains(&i) {
                 self.out.push(
@@ -252,20 +228,6 @@ fn quote(sources: &SourceMap, at: Origin) -> String {
     text.unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Every point that the conventional mechanism is made of.
-fn geometry_of(s: &Structure<'_>, traces: &[crate::ir::Trace]) -> Vec<(ExprPoint, Origin)> {
-    let mut out = Vec::new();
-    for j in &s.joints {
-        out.push((j.point, j.origin));
-        out.extend(j.toward.iter().map(|(_, p)| (*p, j.origin)));
-    }
-    for b in &s.bodies {
-        out.extend(b.skeleton.iter().map(|p| (p.position, b.origin)));
-    }
-    out.extend(traces.iter().map(|t| (t.point, t.origin)));
-    out
-}
-
 /// Visits every expression of a design.
 fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
     for b in &mut design.bodies {
@@ -291,4 +253,5 @@ fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
     for t in &mut design.traces {
         t.point.iter_mut().for_each(&mut *f);
     }
+    design.drives.iter_mut().filter_map(|d| d.free_rest.as_mut()).for_each(&mut *f);
 }

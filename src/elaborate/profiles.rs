@@ -72,7 +72,7 @@ impl<'a> Evaluator<'a> {
         });
         self.starts.1.truncate(time);
         let value = value?;
-        let free = graph::free_variables(&self.exprs, &[value]).into_iter().find(|i| *i != time);
+        let free = self.exprs.free_variables(&[value]).into_iter().find(|i| *i != time);
         if let Some(free) = free {
             let d = Diagnostic::error(
                 codes::NOT_FIXED,

@@ -418,8 +418,10 @@ impl<'a> Evaluator<'a> {
             for b in &joint.bodies {
                 let Some(body) = s.bodies.get_mut(*b) else { continue };
                 let known = body.skeleton.iter().any(|p| {
+                    // Points that only meet where the free variables start are different points.
+                    let fixed = !p.position.iter().chain(&joint.point).any(|id| self.exprs.is_free(*id));
                     p.position == joint.point
-                        || norm(minus(self.start_point(p.position), here)) < SAME_POINT_MM
+                        || fixed && norm(minus(self.start_point(p.position), here)) < SAME_POINT_MM
                 });
                 if !known {
                     body.skeleton.push(NamedPoint { name: name.clone(), position: joint.point });

@@ -1,11 +1,14 @@
-//! The parts of the compliant model that do not depend on the design parameters: rest poses, end
-//! frames of the rods, constraints, drives, traces and their targets, all in rest world coordinates.
+//! What the rods of the compliant model are put into: rest poses, end frames of the rods, constraints, drives, traces
+//! and their targets, all in rest world coordinates; and how it moves with the free variables of the geometry.
 
-use crate::ir::{BodyId, Design};
+use super::change::{LayoutChange, layout_changes};
+use crate::ir::expr::Evaluated;
+use crate::ir::{BodyId, Design, ExprPoint, Joint, JointId};
 use crate::kinematics::{Constraint, JointValue, Motion};
 use crate::math::Pose;
 use crate::rod::RodModel;
 use nalgebra::{Matrix3, Vector3};
+use std::borrow::Cow;
 
 /// Orthonormal frame of a rod end in rest world coordinates: columns e1, e2, e3.
 #[derive(Clone, Debug)]
@@ -70,11 +73,45 @@ pub struct Layout {
     pub length_mm: f64,
     /// Rod theory; the plain one unless set otherwise.
     pub rod_model: RodModel,
+    /// Its derivatives by every free variable that moves it (see [`Design::geometry_variables`]); none where the
+    /// conventional motion has none, at a dead point.
+    pub changes: Option<Vec<LayoutChange>>,
+}
+
+/// What the first axis of a body's end frame points at.
+pub(super) enum Aim {
+    /// A point as drawn.
+    Point(ExprPoint),
+    /// The centroid of these joints' points.
+    Joints(Vec<JointId>),
+}
+
+impl Aim {
+    /// Of a body at a compliant joint.
+    pub(super) fn of(design: &Design, joint: JointId, body: BodyId) -> Self {
+        match design.joints[joint].toward.iter().find(|(b, _)| *b == body) {
+            Some((_, q)) => Self::Point(*q),
+            None => {
+                let other = |(k, j): (usize, &Joint)| (k != joint && j.bodies.contains(&body)).then_some(k);
+                Self::Joints(design.joints.iter().enumerate().filter_map(other).collect())
+            }
+        }
+    }
+
+    /// The point, as drawn.
+    pub(super) fn drawn(&self, values: &Evaluated, joint_points: &[Vector3<f64>]) -> Vector3<f64> {
+        match self {
+            Self::Point(q) => values.point(*q),
+            Self::Joints(all) => {
+                all.iter().map(|k| joint_points[*k]).sum::<Vector3<f64>>() / all.len().max(1) as f64
+            }
+        }
+    }
 }
 
 impl Layout {
     /// Moves the design's drawn geometry to the rest pose. `motion` is the conventional motion of
-    /// the same design, `p` the free variables (geometry outside templates does not depend on them).
+    /// the same design at the free variables `p`.
     pub fn new(design: &Design, motion: &Motion, p: &[f64]) -> Self {
         let values = design.exprs.evaluate(p);
         let rest = &motion.rest.poses;
@@ -105,10 +142,9 @@ impl Layout {
                 continue;
             }
             for [a, b] in joint.pairs() {
-                let axis = rest[a].direction(&Vector3::from(joint.axis));
-                let second = joint.second_axis.map(|s| rest[b].direction(&Vector3::from(s)));
-                let point = at_rest(a, drawn);
-                constraints.extend(Constraint::of_joint(joint.kind, [a, b], point, &axis, second.as_ref()));
+                let (axis, second) = (Vector3::from(joint.axis), joint.second_axis.map(Vector3::from));
+                let made = Constraint::of_joint(joint.kind, [a, b], *drawn, &axis, second.as_ref());
+                constraints.extend(made.iter().map(|c| c.carried(rest)));
             }
         }
         for idle in motion.mobility.idle.iter().filter(|i| i.is_conventional(design)) {
@@ -121,12 +157,11 @@ impl Layout {
             .filter_map(|d| {
                 let joint = &design.joints[d.joint];
                 let pair = joint.pairs().next()?;
-                let axis = rest[pair[0]].direction(&Vector3::from(joint.axis));
-                let point = at_rest(pair[0], &joint_points[d.joint]);
+                let (axis, drawn) = (Vector3::from(joint.axis), joint_points[d.joint]);
                 let steps = design.cycle.steps;
                 Some(LayoutDrive {
-                    joint: JointValue::new(joint.kind, pair, point, &axis)?,
-                    rest: d.rest,
+                    joint: JointValue::new(joint.kind, pair, drawn, &axis)?.carried(&rest[pair[0]]),
+                    rest: d.free_rest.map_or(d.rest, |id| values.value(id)),
                     values: (0..=steps).map(|s| d.value(s as f64 / steps as f64)).collect(),
                 })
             })
@@ -152,19 +187,8 @@ impl Layout {
                 [rod.from.body, rod.to.body].map(|body| {
                     let origin = at_rest(body, &drawn);
                     let e3 = rest[body].direction(&Vector3::from(joint.axis)).normalize();
-                    let aim = match joint.toward.iter().find(|(b, _)| *b == body) {
-                        Some((_, q)) => at_rest(body, &values.point(*q)),
-                        None => {
-                            let others: Vec<Vector3<f64>> = design
-                                .joints
-                                .iter()
-                                .enumerate()
-                                .filter(|(k, j)| *k != rod.joint && j.bodies.contains(&body))
-                                .map(|(k, _)| at_rest(body, &joint_points[k]))
-                                .collect();
-                            others.iter().sum::<Vector3<f64>>() / others.len().max(1) as f64
-                        }
-                    };
+                    let aim = Aim::of(design, rod.joint, body).drawn(&values, joint_points);
+                    let aim = at_rest(body, &aim);
                     let d = aim - origin;
                     let e1 = (d - e3 * d.dot(&e3)).normalize();
                     let e2 = e3.cross(&e1);
@@ -184,7 +208,7 @@ impl Layout {
 
         let closed = design.drives.iter().all(|d| d.is_closed());
         let rest_poses = rest.clone();
-        Self {
+        let mut layout = Self {
             bodies,
             rod_ends,
             constraints,
@@ -194,7 +218,10 @@ impl Layout {
             rest_poses,
             length_mm,
             rod_model: RodModel::default(),
-        }
+            changes: None,
+        };
+        layout.changes = layout_changes(&layout, design, motion, p);
+        layout
     }
 
     /// Number of link unknowns.
@@ -210,5 +237,17 @@ impl Layout {
     /// Number of states that count in sums: a closed cycle's last state is its first.
     pub fn counted_states(&self) -> usize {
         if self.closed && self.states() > 1 { self.states() - 1 } else { self.states() }
+    }
+}
+
+impl<'l> From<&'l Layout> for Cow<'l, Layout> {
+    fn from(layout: &'l Layout) -> Self {
+        Cow::Borrowed(layout)
+    }
+}
+
+impl From<Layout> for Cow<'_, Layout> {
+    fn from(layout: Layout) -> Self {
+        Cow::Owned(layout)
     }
 }

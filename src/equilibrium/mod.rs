@@ -5,6 +5,7 @@
 //! The rods are condensed one by one onto the links they join, so what is solved here is a small
 //! symmetric saddle-point system of link increments and multipliers.
 
+mod change;
 mod layout;
 mod load;
 mod model;
@@ -13,8 +14,9 @@ mod saddle;
 mod sensitivity;
 mod sweep;
 
+pub use change::{DriveChange, EndFrameChange, LayoutChange, TraceChange};
 pub use layout::{Layout, RodEndFrame};
-pub use load::PointForce;
+pub use load::{PointForce, PointForceChange};
 pub use model::{Model, ModelError, ModelRod, State};
 pub use newton::{Equilibrium, SolveError, Solver};
 pub use sensitivity::{Sensitivity, SensitivityWorkspace};

@@ -9,6 +9,7 @@ use crate::rod::{
     SectionShape,
 };
 use nalgebra::{DMatrix, Vector3};
+use std::borrow::Cow;
 
 /// A rod between two bodies.
 #[derive(Clone, Debug)]
@@ -24,10 +25,12 @@ pub struct ModelRod {
 /// The model at given parameters.
 #[derive(Clone, Debug)]
 pub struct Model<'l> {
-    /// What does not depend on the parameters.
-    pub layout: &'l Layout,
+    /// What the rods are put into.
+    pub layout: Cow<'l, Layout>,
     /// One per flexure.
     pub rods: Vec<ModelRod>,
+    /// The design parameters.
+    pub p: Vec<f64>,
 }
 
 /// A flexure whose parameters make no rod.
@@ -70,11 +73,12 @@ impl<'l> Model<'l> {
     /// The first flexure whose rest shape is degenerate.
     pub fn new(
         design: &Design,
-        layout: &'l Layout,
+        layout: impl Into<Cow<'l, Layout>>,
         p: &[f64],
         edges: usize,
         derivatives: bool,
     ) -> Result<Self, ModelError> {
+        let layout: Cow<'l, Layout> = layout.into();
         let values = design.exprs.evaluate(p);
         let material = RodMaterial { e_mpa: design.material.e_mpa, nu: design.material.nu };
         let mut rods = Vec::with_capacity(design.rods.len());
@@ -99,6 +103,18 @@ impl<'l> Model<'l> {
             for c in 0..3 {
                 q[12 + c] = ends[0].axes[(c, 2)];
             }
+            for change in layout.changes.iter().flatten() {
+                let mut column = dq_dp.column_mut(change.parameter);
+                for (k, (end, moved)) in
+                    [&rod.from, &rod.to].into_iter().zip(&change.rod_ends[index]).enumerate()
+                {
+                    let mut position = column.fixed_rows_mut::<3>(6 * k);
+                    position += moved.origin + moved.axes * values.point(end.position);
+                    let mut derivative = column.fixed_rows_mut::<3>(6 * k + 3);
+                    derivative += moved.axes * values.point(end.derivative);
+                }
+                column.fixed_rows_mut::<3>(12).copy_from(&change.rod_ends[index][0].axes.column(2));
+            }
             let [a, b] = rod.section.half_widths();
             for (row, id) in [(15, a), (16, b)] {
                 q[row] = values.value(id);
@@ -112,7 +128,7 @@ impl<'l> Model<'l> {
                 .map_err(|error| ModelError { rod: index, error })?;
             rods.push(ModelRod { rod: built, bodies: [rod.from.body, rod.to.body], dq_dp });
         }
-        Ok(Self { layout, rods })
+        Ok(Self { layout, rods, p: p.to_vec() })
     }
 
     /// The unstressed rest state.

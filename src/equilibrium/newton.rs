@@ -171,7 +171,7 @@ impl Solver {
 
     /// Assembles all rods and measures the residual.
     fn assemble(&mut self, model: &Model, state: &mut State, target: &[f64]) -> Residual {
-        let layout = model.layout;
+        let layout = &model.layout;
         let mut gradient = DVector::zeros(layout.dofs());
         let (mut internal, mut largest, mut least_stiffness, mut floor) = (0.0f64, 0.0f64, f64::MAX, 0.0f64);
         for ((rod, system), rod_state) in model.rods.iter().zip(&mut self.systems).zip(&state.rods) {

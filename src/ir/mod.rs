@@ -55,6 +55,20 @@ pub struct Design {
     pub origin: Origin,
 }
 
+impl Design {
+    /// Indices of the free variables that move the conventional mechanism, its rest pose, or end frames of flexures.
+    pub fn geometry_variables(&self) -> Vec<usize> {
+        let mut roots: Vec<ExprId> = Vec::new();
+        for joint in &self.joints {
+            roots.extend(joint.point);
+            roots.extend(joint.toward.iter().flat_map(|(_, q)| q));
+        }
+        roots.extend(self.traces.iter().flat_map(|t| t.point));
+        roots.extend(self.drives.iter().filter_map(|d| d.free_rest));
+        self.exprs.free_variables(&roots).into_iter().collect()
+    }
+}
+
 /// A design variable: `free START in LOWER .. UPPER`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FreeVariable {

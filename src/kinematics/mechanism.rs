@@ -183,12 +183,14 @@ fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
     let traces = design.traces.iter().all(|t| body(&t.body));
     let moving = design.bodies.iter().filter(|b| !b.ground).count();
     let steps = design.cycle.steps;
+    let values = if p.len() == design.free.len() { design.exprs.values(p) } else { Vec::new() };
     let bounded = |d: &Drive| {
         let most = match d.unit {
             DriveUnit::Rad => MAX_DRIVE_RAD,
             DriveUnit::Mm => MAX_DRIVE_MM,
         };
-        d.rest.abs() <= most && (0..=steps).all(|i| d.value(i as f64 / steps as f64).abs() <= most)
+        d.rest_value(&values).abs() <= most
+            && (0..=steps).all(|i| d.value(i as f64 / steps as f64).abs() <= most)
     };
     let problem = if p.len() != design.free.len() {
         "the number of free values is not the design's"

@@ -1,6 +1,7 @@
 //! Motion of the conventional mechanism over the cycle of its drives: poses, joint angles and traces at every
 //! state, the rest pose, and the findings of a designer's first look (does it close, what turns fully).
 
+use super::idle::unturn;
 use super::mechanism::Mechanism;
 use super::mobility::{Mobility, names};
 use super::path::{Branch, Sample, Stuck};
@@ -113,8 +114,12 @@ pub fn solve_motion(design: &Design, p: &[f64]) -> Result<Motion, Vec<Diagnostic
     else {
         return Err(vec![drawn_at_dead_point(design)]);
     };
-    let rest: Vec<f64> = design.drives.iter().map(|d| d.rest).collect();
-    let rest = to_rest.advance(&rest).map_err(|stuck| vec![cannot_close(design, &stuck, Some(&rest))])?;
+    let values = design.exprs.values(p);
+    let rest: Vec<f64> = design.drives.iter().map(|d| d.rest_value(&values)).collect();
+    let mut rest = to_rest.advance(&rest).map_err(|stuck| vec![cannot_close(design, &stuck, Some(&rest))])?;
+    if let Some(poses) = unturn(&mechanism, &rest.poses, &rest.drive) {
+        rest.poses = poses;
+    }
     let mut states = Vec::with_capacity(steps + 1);
     for target in targets {
         let sample = cycle.advance(&target).map_err(|stuck| vec![cannot_close(design, &stuck, None)])?;

@@ -52,8 +52,8 @@ impl Stages for Compiler {
         Checked { sources: out.sources, design: out.design, diagnostics: out.diagnostics }
     }
 
-    fn rigid(&self, design: &Design) -> Result<Simulation, Failed> {
-        let motion = solve_motion(design, &starts(design))?;
+    fn rigid(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
+        let motion = solve_motion(design, values)?;
         let states = motion
             .states
             .iter()
@@ -109,6 +109,9 @@ impl Stages for Compiler {
         cancel: &AtomicBool,
     ) -> Result<Solved, Failed> {
         let (layout, _) = layout(design, start)?;
+        if layout.changes.is_none() {
+            return Err(vec![dead_point(design)]);
+        }
         let problem = Problem::new(design, &layout, EDGES);
         let names = problem.term_names();
         let told = |i: &optimize::Iteration| {
@@ -168,14 +171,20 @@ impl Stages for Compiler {
     }
 }
 
-/// Conventional motion and layout. The free variables reach flexures only, so any values do.
+/// Conventional motion and layout.
 pub(super) fn layout(design: &Design, values: &[f64]) -> Result<(Layout, Motion), Failed> {
     let motion = solve_motion(design, values)?;
     Ok((Layout::new(design, &motion, values), motion))
 }
 
-fn starts(design: &Design) -> Vec<f64> {
-    design.free.iter().map(|f| f.start).collect()
+/// The geometry is to vary, but the conventional motion cannot be differentiated at the start.
+fn dead_point(design: &Design) -> Diagnostic {
+    let moving = design.geometry_variables();
+    let first = moving.first().and_then(|i| design.free.get(*i));
+    let message = "points cannot be free in a cycle that stops exactly at a dead point";
+    Diagnostic::error("E0612", message, first.map_or(design.origin, |f| f.origin))
+        .label("this moves points of the mechanism, or its rest pose")
+        .help("shift the drive's range a little, take another number of steps, or write a number here")
 }
 
 fn table(design: &Design, has_forces: bool, states: Vec<MotionState>) -> MotionTable {

@@ -108,7 +108,7 @@ fn run_build(
     }
     clock.stop(&mut out.seconds.mesh);
     let clock = Clock::start(progress, Stage::Emit);
-    emit_sketches(&design, out);
+    emit_sketches(&design, &values, out);
     clock.stop(&mut out.seconds.emit);
     Some(())
 }
@@ -129,10 +129,11 @@ pub fn simulate(
 ) -> (BuildOutcome, Option<Simulation>) {
     let mut out = BuildOutcome::default();
     let simulation = front_end(request, stages, files, &mut out).and_then(|design| {
-        let result = if show.rigid {
-            stages.rigid(&design)
+        let start = Solution { values: start_of(&design), ..Solution::default() };
+        // Where nothing of the geometry is free, the conventional motion needs no lock.
+        let result = if show.rigid && design.geometry_variables().is_empty() {
+            stages.rigid(&design, &values_of(&design, &start))
         } else {
-            let start = Solution { values: start_of(&design), ..Solution::default() };
             let solution = match read_lock(request, &design, &mut out) {
                 Ok(Some((lock, LockState::Current))) => lock.solution,
                 Ok(_) if request.frozen => {
@@ -142,7 +143,8 @@ pub fn simulate(
                 Ok(_) => start,
                 Err(()) => return None,
             };
-            stages.simulate(&design, &values_of(&design, &solution))
+            let values = values_of(&design, &solution);
+            if show.rigid { stages.rigid(&design, &values) } else { stages.simulate(&design, &values) }
         };
         let mut simulation = keep(result, &mut out.diagnostics)?;
         if !show.rigid {
@@ -170,8 +172,9 @@ fn front_end(
         return None;
     }
     let design = checked.design?;
+    let starts: Vec<f64> = design.free.iter().map(|v| v.start).collect();
     // That it can be assembled all the way is part of being right.
-    let rigid = keep(stages.rigid(&design), &mut out.diagnostics)?;
+    let rigid = keep(stages.rigid(&design, &starts), &mut out.diagnostics)?;
     out.diagnostics.extend(rigid.diagnostics);
     out.design = Some(design.clone());
     Some(design)
@@ -268,10 +271,10 @@ fn frozen(design: &Design, request: &Request) -> Diagnostic {
     Diagnostic::error("E0710", message, design.origin).help("build without `--frozen` and keep the new lock")
 }
 
-fn emit_sketches(design: &Design, out: &mut BuildOutcome) {
+fn emit_sketches(design: &Design, values: &[f64], out: &mut BuildOutcome) {
     for export in &design.exports {
         let ExportKind::Arduino(drive) = export.kind else { continue };
-        match Sketch::of(design, drive).and_then(|s| Ok((s.name(), s.render()?))) {
+        match Sketch::of(design, drive, values).and_then(|s| Ok((s.name(), s.render()?))) {
             Ok((name, text)) => {
                 out.artefacts.push(Artefact { name: format!("{name}/{name}.ino"), bytes: text.into_bytes() })
             }

@@ -62,7 +62,7 @@ pub trait Stages {
     ///
     /// # Errors
     /// Where it cannot be assembled, or its mobility does not match its drives.
-    fn rigid(&self, design: &Design) -> Result<Simulation, Failed>;
+    fn rigid(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed>;
 
     /// One sweep of the compliant mechanism from its unstressed rest pose.
     ///

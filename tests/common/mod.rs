@@ -2,6 +2,7 @@
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 pub mod annotated;
+pub mod gradient;
 
 use flexura::elaborate::{FileError, Files};
 use flexura::ir::Design;

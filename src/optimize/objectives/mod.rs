@@ -10,11 +10,11 @@ mod track;
 
 pub use soft_maximum::{Level, Sampled};
 
-use crate::equilibrium::{Equilibrium, Layout, Model, PointForce, Sensitivity};
+use crate::equilibrium::{Equilibrium, Layout, Model, PointForce, PointForceChange, Sensitivity};
 use crate::ir::{Design, ObjectiveKind};
 use crate::math::skew;
 use crate::optimize::Normal;
-use nalgebra::{Matrix3xX, Vector3};
+use nalgebra::Matrix3xX;
 
 /// Sums over the cycle are means times this, so that the number of steps does not change the balance
 /// of the terms; the paper's weights belong to 60 steps.
@@ -103,16 +103,37 @@ pub fn build(design: &Design, layout: &Layout) -> (Vec<Term>, Vec<Vec<PointForce
     (terms, cases)
 }
 
-/// Derivatives of a body's point (rest coordinates) by the n design parameters, 3 × n; none on ground.
-fn point_rows(
+/// How the load cases of [`build`] change with each of the layout's changes: per case, change and state.
+pub fn load_changes(design: &Design, layout: &Layout) -> Vec<Vec<Vec<PointForceChange>>> {
+    let mut changes = Vec::new();
+    for o in &design.objectives {
+        if let ObjectiveKind::Sway { trace, force_n, .. } = &o.kind {
+            changes.extend(sway::load_case_changes(design, layout, *trace, *force_n));
+        }
+    }
+    changes
+}
+
+/// Derivatives of a trace's place by the n design parameters, 3 × n: as its body moves, and as it moves within.
+fn trace_rows(
     model: &Model,
     equilibrium: &Equilibrium,
     sensitivity: &Sensitivity,
-    body: usize,
-    rest: &Vector3<f64>,
-) -> Option<Matrix3xX<f64>> {
-    let first = model.layout.bodies[body].first_dof?;
-    let arm = equilibrium.state.poses[body].arm(rest);
-    // δz = δu + δφ × r
-    Some(sensitivity.links.fixed_rows::<3>(first) - skew(&arm) * sensitivity.links.fixed_rows::<3>(first + 3))
+    index: usize,
+) -> Matrix3xX<f64> {
+    let trace = &model.layout.traces[index];
+    let pose = &equilibrium.state.poses[trace.body];
+    let mut rows = match model.layout.bodies[trace.body].first_dof {
+        // δz = δu + δφ × r
+        Some(first) => {
+            sensitivity.links.fixed_rows::<3>(first)
+                - skew(&pose.arm(&trace.rest)) * sensitivity.links.fixed_rows::<3>(first + 3)
+        }
+        None => Matrix3xX::zeros(model.p.len()),
+    };
+    for change in model.layout.changes.iter().flatten() {
+        let mut column = rows.column_mut(change.parameter);
+        column += pose.direction(&change.traces[index].rest);
+    }
+    rows
 }

@@ -1,6 +1,6 @@
 //! Motion tracking (Megaro et al. 2017, eq. 3): ½ Σ ‖z_t − z̄_t‖², without alignment or phase shift.
 
-use super::{Objective, StateView, StatesSensitivity, point_rows};
+use super::{Objective, StateView, StatesSensitivity, trace_rows};
 use crate::optimize::Normal;
 use nalgebra::Vector3;
 
@@ -38,13 +38,13 @@ impl Objective for Track {
     }
 
     fn accumulate(&self, view: &StateView, at: &StatesSensitivity, out: &mut Normal) {
-        let trace = &view.model.layout.traces[self.trace];
         let error = self.error_mm(view);
         let weight = self.factor * view.share;
-        let Some(rows) = point_rows(view.model, view.equilibrium, &at.free, trace.body, &trace.rest) else {
-            out.cost += 0.5 * weight * error.norm_squared();
-            return;
-        };
+        let mut rows = trace_rows(view.model, view.equilibrium, &at.free, self.trace);
+        for change in view.model.layout.changes.iter().flatten() {
+            let mut column = rows.column_mut(change.parameter);
+            column -= change.traces[self.trace].target[view.state];
+        }
         for c in 0..3 {
             let row: Vec<f64> = rows.row(c).iter().copied().collect();
             out.add(weight, error[c], &row);
