@@ -1,10 +1,12 @@
 //! How the layout moves with the free variables of the geometry: joint points, rest drive values, traces. Everything a
 //! body carries moves with its rest pose; drawn points move besides.
 
-use super::layout::{Aim, Layout};
+use super::frames::{Aim, Framed, Seen, axes, axis_carrier};
+use super::layout::Layout;
 use crate::ir::expr::Evaluated;
-use crate::ir::{BodyId, Design, ExprPoint};
+use crate::ir::{BodyId, Design, ExprPoint, JointId};
 use crate::kinematics::{Constraint, Motion, MotionChange, ReferenceChange, Twist, motion_changes};
+use crate::math::dual::Dual;
 use nalgebra::{Matrix3, Matrix3xX, Vector3};
 
 /// Derivatives of a [`Layout`] by one free variable, per unit of it.
@@ -128,12 +130,32 @@ impl Making<'_> {
     }
 
     fn end_frame(&self, rod: usize, end: usize) -> EndFrameChange {
-        let (frame, joint) = (&self.layout.rod_ends[rod][end], self.design.rods[rod].joint);
-        let body = frame.body;
-        let origin = self.at_rest(body, &frame.origin, &self.change.joint_points[joint]);
+        let text = &self.design.rods[rod];
+        let (joint, framed) = (&self.design.joints[text.joint], Framed::of(self.design, text, end));
+        let rest = &self.layout.rest_poses;
+        let carried = |body: BodyId, axis: [f64; 3]| {
+            let axis = rest[body].direction(&Vector3::from(axis));
+            along(&axis, &self.change.rest[body].turn.cross(&axis))
+        };
+        let second = joint.bodies.get(1).copied().unwrap_or(framed.body);
+        let seen = Seen {
+            axis: carried(axis_carrier(joint, framed.body), joint.axis),
+            second: carried(second, joint.second_axis.unwrap_or(joint.axis)),
+            way: self.way(text.joint, framed.body),
+            other: framed.other.map(|b| self.way(text.joint, b)),
+        };
+        let columns = axes(joint, text, end, &seen).map(|e| Vector3::from(e.map(|x| x.eps[0])));
+        let origin = &self.layout.rod_ends[rod][end].origin;
+        EndFrameChange {
+            origin: self.at_rest(framed.body, origin, &self.change.joint_points[text.joint]),
+            axes: Matrix3::from_columns(&columns),
+        }
+    }
+
+    /// From a joint to what a body aims at there, with its rate.
+    fn way(&self, joint: JointId, body: BodyId) -> [Dual<1>; 3] {
         let aim = Aim::of(self.design, joint, body);
         let drawn = aim.drawn(self.values, &self.motion.joint_points);
-        let at = self.layout.rest_poses[body].point(&drawn);
         let by_drawn = match aim {
             Aim::Point(q) => {
                 let by = |id| self.values.gradient(id).get(self.change.parameter).copied().unwrap_or(0.0);
@@ -144,15 +166,11 @@ impl Making<'_> {
                 sum / all.len().max(1) as f64
             }
         };
-        let (e1, e3) = (frame.axes.column(0).into_owned(), frame.axes.column(2).into_owned());
-        let (d, by_d) = (at - frame.origin, self.at_rest(body, &at, &by_drawn) - origin);
-        let by_e3 = self.change.rest[body].turn.cross(&e3);
-        let along = d.dot(&e3);
-        let flat = d - e3 * along;
-        let by_flat = by_d - by_e3 * along - e3 * (by_d.dot(&e3) + d.dot(&by_e3));
-        let by_e1 = (by_flat - e1 * e1.dot(&by_flat)) / flat.norm();
-        let by_e2 = by_e3.cross(&e1) + e3.cross(&by_e1);
-        EndFrameChange { origin, axes: Matrix3::from_columns(&[by_e1, by_e2, by_e3]) }
+        let pose = &self.layout.rest_poses[body];
+        let (here, there) = (pose.point(&self.motion.joint_points[joint]), pose.point(&drawn));
+        let rate = self.at_rest(body, &there, &by_drawn)
+            - self.at_rest(body, &here, &self.change.joint_points[joint]);
+        along(&(there - here), &rate)
     }
 
     /// In the order in which [`Layout::new`] makes them.
@@ -187,4 +205,9 @@ impl Making<'_> {
         })
         .collect()
     }
+}
+
+/// A vector with its rate.
+fn along(x: &Vector3<f64>, rate: &Vector3<f64>) -> [Dual<1>; 3] {
+    std::array::from_fn(|i| Dual { re: x[i], eps: [rate[i]] })
 }

@@ -2,29 +2,18 @@
 //! and their targets, all in rest world coordinates; and how it moves with the free variables of the geometry.
 
 use super::change::{LayoutChange, layout_changes};
-use crate::ir::expr::Evaluated;
-use crate::ir::{BodyId, Design, ExprPoint, Joint, JointId};
+use super::frames::{RodEndFrame, end_frames};
+use crate::ir::{BodyId, Design};
 use crate::kinematics::{Constraint, JointValue, Motion};
 use crate::math::Pose;
 use crate::rod::RodModel;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use std::borrow::Cow;
-
-/// Orthonormal frame of a rod end in rest world coordinates: columns e1, e2, e3.
-#[derive(Clone, Debug)]
-pub struct RodEndFrame {
-    /// Body the end is clamped in.
-    pub body: BodyId,
-    /// The joint's physical point in the rest pose, mm.
-    pub origin: Vector3<f64>,
-    /// Columns e1, e2, e3.
-    pub axes: Matrix3<f64>,
-}
 
 /// A rigid body of the compliant model.
 #[derive(Clone, Debug)]
 pub struct LayoutBody {
-    /// Centre of its increments: centroid of its joint points at rest, mm.
+    /// Centre of its increments: centroid of its joint points at rest, of a flexure's own body the joint's, mm.
     pub center: Vector3<f64>,
     /// First of its six unknowns, none for ground.
     pub first_dof: Option<usize>,
@@ -78,37 +67,6 @@ pub struct Layout {
     pub changes: Option<Vec<LayoutChange>>,
 }
 
-/// What the first axis of a body's end frame points at.
-pub(super) enum Aim {
-    /// A point as drawn.
-    Point(ExprPoint),
-    /// The centroid of these joints' points.
-    Joints(Vec<JointId>),
-}
-
-impl Aim {
-    /// Of a body at a compliant joint.
-    pub(super) fn of(design: &Design, joint: JointId, body: BodyId) -> Self {
-        match design.joints[joint].toward.iter().find(|(b, _)| *b == body) {
-            Some((_, q)) => Self::Point(*q),
-            None => {
-                let other = |(k, j): (usize, &Joint)| (k != joint && j.bodies.contains(&body)).then_some(k);
-                Self::Joints(design.joints.iter().enumerate().filter_map(other).collect())
-            }
-        }
-    }
-
-    /// The point, as drawn.
-    pub(super) fn drawn(&self, values: &Evaluated, joint_points: &[Vector3<f64>]) -> Vector3<f64> {
-        match self {
-            Self::Point(q) => values.point(*q),
-            Self::Joints(all) => {
-                all.iter().map(|k| joint_points[*k]).sum::<Vector3<f64>>() / all.len().max(1) as f64
-            }
-        }
-    }
-}
-
 impl Layout {
     /// Moves the design's drawn geometry to the rest pose. `motion` is the conventional motion of
     /// the same design at the free variables `p`.
@@ -128,7 +86,11 @@ impl Layout {
                 .filter(|(j, _)| j.bodies.contains(&i))
                 .map(|(_, p)| at_rest(i, p))
                 .collect();
-            let center = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
+            let center = match body.owner {
+                // Its rods lie round the joint.
+                Some(joint) => at_rest(i, &joint_points[joint]),
+                None => points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64,
+            };
             let first_dof = (!body.ground).then(|| {
                 next += 6;
                 next - 6
@@ -178,24 +140,7 @@ impl Layout {
             })
             .collect();
 
-        let rod_ends = design
-            .rods
-            .iter()
-            .map(|rod| {
-                let joint = &design.joints[rod.joint];
-                let drawn = joint_points[rod.joint];
-                [rod.from.body, rod.to.body].map(|body| {
-                    let origin = at_rest(body, &drawn);
-                    let e3 = rest[body].direction(&Vector3::from(joint.axis)).normalize();
-                    let aim = Aim::of(design, rod.joint, body).drawn(&values, joint_points);
-                    let aim = at_rest(body, &aim);
-                    let d = aim - origin;
-                    let e1 = (d - e3 * d.dot(&e3)).normalize();
-                    let e2 = e3.cross(&e1);
-                    RodEndFrame { body, origin, axes: Matrix3::from_columns(&[e1, e2, e3]) }
-                })
-            })
-            .collect();
+        let rod_ends = end_frames(design, motion, &values);
 
         // A typical arm: the mean distance of the joints from the centres of their bodies.
         let mut arms = (0.0, 0);

@@ -6,6 +6,7 @@
 //! symmetric saddle-point system of link increments and multipliers.
 
 mod change;
+mod frames;
 mod layout;
 mod load;
 mod model;
@@ -15,7 +16,8 @@ mod sensitivity;
 mod sweep;
 
 pub use change::{DriveChange, EndFrameChange, LayoutChange, TraceChange};
-pub use layout::{Layout, RodEndFrame};
+pub use frames::RodEndFrame;
+pub use layout::Layout;
 pub use load::{PointForce, PointForceChange};
 pub use model::{Model, ModelError, ModelRod, State};
 pub use newton::{Equilibrium, SolveError, Solver};

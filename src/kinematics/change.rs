@@ -135,7 +135,15 @@ impl<'m, 'd> Follower<'m, 'd> {
             }
             None => Twist::default(),
         };
-        bodies.map(twist).collect()
+        let mut twists: Vec<Twist> = bodies.map(twist).collect();
+        for (id, body) in self.mechanism.design.bodies.iter().enumerate() {
+            // A flexure's own body goes with the first of its joint.
+            let joint = body.owner.and_then(|j| self.mechanism.design.joints.get(j));
+            if let Some(carrier) = joint.and_then(|j| j.bodies.first()) {
+                twists[id] = twists[*carrier];
+            }
+        }
+        twists
     }
 }
 

@@ -36,7 +36,23 @@ pub fn build(
     Ok((parts, found))
 }
 
-/// Whether every conventional joint has a printable form.
+/// Flexures whose bodies have no printed form yet: all but those of a hinge, and those with bodies of their own.
+fn unprintable(design: &Design) -> Option<Diagnostic> {
+    let own = |id: JointId| design.bodies.iter().any(|b| b.owner == Some(id));
+    let is = |(id, j): &(JointId, &Joint)| j.is_compliant() && (j.kind != JointKind::Hinge || own(*id));
+    let (id, joint) = design.joints.iter().enumerate().find(is)?;
+    let what = match own(id) {
+        true => "with a body of its own".to_string(),
+        false => format!("in place of a {} joint", joint.kind.name()),
+    };
+    let message = format!("the printed form of a flexure {what} is not available yet");
+    Some(
+        Diagnostic::error("E0901", message, joint.origin)
+            .help("without `export stl` the mechanism can be checked, simulated and solved"),
+    )
+}
+
+/// Whether every joint has a printable form.
 ///
 /// # Errors
 /// Joints whose form is not there yet, each at its place.
@@ -59,6 +75,7 @@ pub fn available(design: &Design) -> Result<(), Failed> {
         .help("without `export stl` the mechanism can be checked, simulated and solved")
     };
     let found: Vec<Diagnostic> = design.joints.iter().filter(missing).map(told).collect();
+    let found: Vec<Diagnostic> = found.into_iter().chain(unprintable(design)).collect();
     if !found.is_empty() {
         return Err(found);
     }
