@@ -6,7 +6,7 @@ use flexura::equilibrium::{Layout, Model};
 use flexura::geometry::skeleton::{connect, median_derivative};
 use flexura::geometry::{SkeletonCapsule, parts_input, plan_bodies, skeleton_capsules};
 use flexura::ir::Design;
-use flexura::kinematics::{Motion, solve_motion};
+use flexura::kinematics::solve_motion;
 use nalgebra::Vector3;
 
 mod common;
@@ -17,22 +17,22 @@ const STEP: f64 = 1e-5;
 /// Agreement of derivatives, relative to the largest.
 const TOLERANCE: f64 = 1e-6;
 
-fn example() -> (Design, Layout, Motion) {
+fn example() -> (Design, Layout) {
     let options = Options { steps: Some(4), ..Options::default() };
     let design = elaborate("chebyshev.mech", &common::ExampleFiles, &options).design.unwrap();
     let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
     let motion = solve_motion(&design, &start).unwrap();
     let layout = Layout::new(&design, &motion, &start);
-    (design, layout, motion)
+    (design, layout)
 }
 
-fn capsules(design: &Design, layout: &Layout, motion: &Motion, p: &[f64]) -> Vec<SkeletonCapsule> {
+fn capsules(design: &Design, layout: &Layout, p: &[f64]) -> Vec<SkeletonCapsule> {
     let model = Model::new(design, layout, p, EDGES, true).unwrap();
-    let plans = plan_bodies(&parts_input(design, layout, motion, &model)).unwrap();
+    let plans = plan_bodies(&parts_input(design, layout, &model)).unwrap();
     for plan in &plans {
         assert_eq!(plan.slots.len(), plan.follows.len());
     }
-    skeleton_capsules(&plans, &model, &Vector3::from(design.layers.axis), p.len())
+    skeleton_capsules(&plans, &model, p.len())
 }
 
 fn numbers(c: &SkeletonCapsule) -> Vec<f64> {
@@ -52,17 +52,17 @@ fn derivatives(c: &SkeletonCapsule, column: usize) -> Vec<f64> {
 
 #[test]
 fn capsules_follow_every_parameter() {
-    let (design, layout, motion) = example();
+    let (design, layout) = example();
     let mut moving = 0;
     for seed in [2, 5, 9] {
         let p = common::shaken(&design, seed);
-        let at = capsules(&design, &layout, &motion, &p);
+        let at = capsules(&design, &layout, &p);
         for (i, free) in design.free.iter().enumerate() {
             let h = STEP * (free.upper - free.lower);
             let shifted = |by: f64| {
                 let mut q = p.clone();
                 q[i] += by;
-                capsules(&design, &layout, &motion, &q)
+                capsules(&design, &layout, &q)
             };
             let (more, less) = (shifted(h), shifted(-h));
             assert_eq!((at.len(), at.len()), (more.len(), less.len()), "the net of nodes stays");
@@ -88,12 +88,12 @@ fn capsules_follow_every_parameter() {
 /// Every capsule of a fan lies inside its slot and reaches its faces.
 #[test]
 fn fans_fill_their_slots() {
-    let (design, layout, motion) = example();
+    let (design, layout) = example();
     let p: Vec<f64> = design.free.iter().map(|f| f.start).collect();
     let model = Model::new(&design, &layout, &p, EDGES, true).unwrap();
-    let plans = plan_bodies(&parts_input(&design, &layout, &motion, &model)).unwrap();
+    let plans = plan_bodies(&parts_input(&design, &layout, &model)).unwrap();
     let axis = Vector3::from(design.layers.axis);
-    let all = skeleton_capsules(&plans, &model, &axis, p.len());
+    let all = skeleton_capsules(&plans, &model, p.len());
     for (body, plan) in plans.iter().enumerate() {
         let of_body: Vec<_> = all.iter().filter(|c| c.body == body).collect();
         for (role, slot) in &plan.slots {
@@ -102,11 +102,11 @@ fn fans_fill_their_slots() {
             let side = axis.cross(&(slot.end - slot.start)).try_normalize(1e-9).unwrap_or_else(Vector3::x);
             for direction in [axis, -axis, side, -side] {
                 let slot_reach = slot.support(&direction).dot(&direction) + slot.round_mm;
-                let reach = |c: &&&SkeletonCapsule| {
+                let reach = |c: &&SkeletonCapsule| {
                     let fan = c.fan.dot(&direction).abs() * c.spread_mm;
                     c.ends.iter().map(|e| e.dot(&direction)).fold(f64::MIN, f64::max) + fan + c.radius_mm
                 };
-                let most = fans.iter().map(|c| reach(&c)).fold(f64::MIN, f64::max);
+                let most = fans.iter().map(|c| reach(c)).fold(f64::MIN, f64::max);
                 // Another slot of the same role may reach further.
                 assert!(most > slot_reach - 0.15, "{role:?}: {most} {slot_reach}");
             }

@@ -14,10 +14,8 @@ pub enum Anchor {
     /// The end of a flexure: a fixed way from its attachment, along its outward tangent laid into the plane
     /// normal to the stacking axis.
     Stub {
-        /// Index of the flexure.
-        flexure: usize,
-        /// Which end.
-        at_end: bool,
+        /// The end.
+        end: FlexureEnd,
         /// The way, mm.
         along_mm: f64,
         /// How the way follows the end.
@@ -43,6 +41,17 @@ pub enum Anchor {
     Middle(Box<[Anchor; 2]>),
 }
 
+/// An end of a flexure as a body built in layers sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlexureEnd {
+    /// Index of the flexure.
+    pub flexure: usize,
+    /// The second of its ends.
+    pub at_end: bool,
+    /// Unit axis of the body's layers.
+    pub axis: Vector3<f64>,
+}
+
 /// Derivatives of a length by what a flexure's end has: the height of its attachment along the stacking axis and
 /// its half widths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -60,8 +69,8 @@ pub struct SizeBy {
 pub struct Follow {
     /// Its start and its end.
     pub ends: [Anchor; 2],
-    /// Flexure and end its sizes follow; none: they are fixed.
-    pub sized_by: Option<(usize, bool)>,
+    /// The end its sizes follow; none: they are fixed.
+    pub sized_by: Option<FlexureEnd>,
     /// Its outer radius.
     pub radius: SizeBy,
     /// Its outer half height.
@@ -84,8 +93,6 @@ impl Follow {
 pub struct Followed<'m> {
     /// The rods, in the order of the flexures.
     pub rods: &'m [ModelRod],
-    /// Unit stacking axis.
-    pub axis: Vector3<f64>,
     /// Number of design parameters.
     pub parameters: usize,
 }
@@ -95,9 +102,7 @@ impl Followed<'_> {
     pub fn point(&self, anchor: &Anchor) -> Matrix3xX<f64> {
         match anchor {
             Anchor::Fixed => Matrix3xX::zeros(self.parameters),
-            Anchor::Stub { flexure, at_end, along_mm, along, level } => {
-                self.stub(*flexure, *at_end, *along_mm, along, level)
-            }
+            Anchor::Stub { end, along_mm, along, level } => self.stub(end, *along_mm, along, level),
             Anchor::Hub { nodes, at } => {
                 let points: Vec<Vector3<f64>> = nodes.iter().map(|n| n.0).collect();
                 let mut sum = Matrix3xX::zeros(self.parameters);
@@ -123,38 +128,32 @@ impl Followed<'_> {
         }
     }
 
-    fn stub(
-        &self,
-        flexure: usize,
-        at_end: bool,
-        along_mm: f64,
-        along: &SizeBy,
-        level: &SizeBy,
-    ) -> Matrix3xX<f64> {
+    fn stub(&self, end: &FlexureEnd, along_mm: f64, along: &SizeBy, level: &SizeBy) -> Matrix3xX<f64> {
+        let FlexureEnd { flexure, at_end, axis } = *end;
         let Some(rod) = self.rods.get(flexure) else { return Matrix3xX::zeros(self.parameters) };
         let q = rod.rod.parameters();
         // Outward is back along the curve at its first end.
         let outward = if at_end { q.derivative_b } else { -q.derivative_a };
         let sign = if at_end { 1.0 } else { -1.0 };
-        let flatten = Matrix3::identity() - self.axis * self.axis.transpose();
+        let flatten = Matrix3::identity() - axis * axis.transpose();
         let (row, flat) = (if at_end { 6 } else { 0 }, flatten * outward);
         let length = flat.norm().max(f64::MIN_POSITIVE);
         let u = flat / length;
         let turn = (Matrix3::identity() - u * u.transpose()) * flatten * (sign * along_mm / length);
         let mut out = flatten * rod.dq_dp.rows(row, 3) + turn * rod.dq_dp.rows(row + 3, 3);
-        out += u * self.size(flexure, at_end, along) + self.axis * self.size(flexure, at_end, level);
+        out += u * self.size(end, along) + axis * self.size(end, level);
         Matrix3xX::from_columns(
             &out.column_iter().map(|c| Vector3::new(c[0], c[1], c[2])).collect::<Vec<_>>(),
         )
     }
 
     /// Derivative of a length, 1 × n.
-    pub fn size(&self, flexure: usize, at_end: bool, by: &SizeBy) -> RowDVector<f64> {
-        let Some(rod) = self.rods.get(flexure).filter(|_| *by != SizeBy::default()) else {
+    pub fn size(&self, end: &FlexureEnd, by: &SizeBy) -> RowDVector<f64> {
+        let Some(rod) = self.rods.get(end.flexure).filter(|_| *by != SizeBy::default()) else {
             return RowDVector::zeros(self.parameters);
         };
-        let row = if at_end { 6 } else { 0 };
-        let level = self.axis.transpose() * rod.dq_dp.rows(row, 3);
+        let row = if end.at_end { 6 } else { 0 };
+        let level = end.axis.transpose() * rod.dq_dp.rows(row, 3);
         let size = level * by.level + rod.dq_dp.row(15) * by.a + rod.dq_dp.row(16) * by.b;
         RowDVector::from_iterator(self.parameters, size.iter().copied())
     }

@@ -42,15 +42,13 @@ pub struct SkeletonCapsule {
     pub d_radius_dp: RowDVector<f64>,
 }
 
-/// The bodies' `plans` as capsules, with derivatives by the `parameters` design parameters of `model`. `axis` is the unit
-/// stacking axis. Nets of nodes and detours are those of the plans; only what a plan says it follows moves.
+/// The bodies' `plans` as capsules, with derivatives by the `parameters` design parameters of `model`. Nets of nodes and detours are those of the plans; only what a plan says it follows moves.
 pub fn skeleton_capsules(
     plans: &[BodyPlan],
     model: &Model,
-    axis: &Vector3<f64>,
     parameters: usize,
 ) -> Vec<SkeletonCapsule> {
-    let followed = Followed { rods: &model.rods, axis: *axis, parameters };
+    let followed = Followed { rods: &model.rods, parameters };
     let fixed = Follow::default();
     let mut out = Vec::new();
     for (body, plan) in plans.iter().enumerate() {
@@ -73,8 +71,8 @@ fn add_slot(
     let n = followed.parameters;
     let (radius, half) = (slot.radius_mm(), slot.half_height_mm + slot.round_mm);
     let still = || Matrix3xX::zeros(n);
-    let sizes = [&follow.radius, &follow.half_height].map(|by| match follow.sized_by {
-        Some((flexure, at_end)) => followed.size(flexure, at_end, by),
+    let sizes = [&follow.radius, &follow.half_height].map(|by| match &follow.sized_by {
+        Some(end) => followed.size(end, by),
         None => RowDVector::zeros(n),
     });
     let [by_radius, by_half] = sizes;

@@ -4,7 +4,6 @@ use super::parts::{BodySolid, Bore, Eye, FlexureSolid, PartsInput};
 use super::slot::Facets;
 use crate::equilibrium::{Layout, Model};
 use crate::ir::{BodyId, Design, Joint, JointId, Realization};
-use crate::kinematics::Motion;
 use crate::rod::RodState;
 use nalgebra::Vector3;
 
@@ -14,7 +13,7 @@ const SAME_POINT_MM: f64 = 1e-6;
 const SHAFT_FIT: f64 = 0.5;
 
 /// Bodies and flexures of a design in its rest pose, the flexures as `model` has them.
-pub fn parts_input(design: &Design, layout: &Layout, motion: &Motion, model: &Model) -> PartsInput {
+pub fn parts_input(design: &Design, layout: &Layout, model: &Model) -> PartsInput {
     let values = design.exprs.values(&design.free.iter().map(|f| f.start).collect::<Vec<_>>());
     let drawn = |p: [crate::ir::expr::ExprId; 3]| Vector3::from(p.map(|id| values[id.0 as usize]));
     let pitch = design.layers.pitch_mm;
@@ -34,11 +33,11 @@ pub fn parts_input(design: &Design, layout: &Layout, motion: &Motion, model: &Mo
             BodySolid {
                 name: body.name.clone(),
                 level_mm: f64::from(body.layer) * pitch,
-                skeleton: skeleton.map(|p| motion.rest_point(b, &p)).collect(),
+                skeleton: skeleton.map(|p| layout.rest_poses[b].point(&p)).collect(),
                 eyes: eyes
                     .map(|(j, joint)| Eye {
                         joint: j,
-                        point: motion.rest_point(b, &motion.joint_points[j]),
+                        point: layout.rest_poses[b].point(&layout.joint_points[j]),
                         bore: bore(design, j, joint, b),
                         slot: slot(design, joint, b),
                     })

@@ -5,7 +5,7 @@
 //! its neck, so that no two faces coincide and the boolean kernel meets only clear crossings. What
 //! is left (bars side by side under one boss) is kept apart by a small spread of heights.
 
-use super::anchor::{Anchor, Follow, SizeBy};
+use super::anchor::{Anchor, FlexureEnd, Follow, SizeBy};
 use super::distance::separation;
 use super::mesh::Mesh;
 use super::parts::{Bore, Eye, FLOOR_MM, GeometryError, PartsInput};
@@ -341,9 +341,9 @@ impl Builder<'_> {
             half_by = SizeBy::default();
         }
         let radius_by = SizeBy { a: f64::from(u8::from(a + wall > STUB_RADIUS_MM)), ..SizeBy::default() };
+        let end = FlexureEnd { flexure: index, at_end, axis };
         let along = |along_mm: f64, along: SizeBy, level: SizeBy| Anchor::Stub {
-            flexure: index,
-            at_end,
+            end,
             along_mm,
             along,
             level,
@@ -355,7 +355,7 @@ impl Builder<'_> {
             Slot::bar(nose, root, axis, radius, half_height.max(LEAST_HALF_MM), STUB_ROUND_MM),
             Follow {
                 ends: [nose_anchor, along(reach, SizeBy::default(), centred)],
-                sized_by: Some((index, at_end)),
+                sized_by: Some(end),
                 radius: radius_by,
                 half_height: half_by,
             },

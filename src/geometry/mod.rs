@@ -33,7 +33,7 @@ pub mod union;
 #[cfg(test)]
 mod tests;
 
-pub use anchor::{Anchor, Follow, SizeBy};
+pub use anchor::{Anchor, FlexureEnd, Follow, SizeBy};
 pub use capsules::{SkeletonCapsule, skeleton_capsules};
 pub use check::{MeshFacts, check_mesh};
 pub use cycle::{CycleGaps, LeastGap, MovedState, cycle_gaps};

@@ -8,7 +8,6 @@ use crate::geometry::{
     parts_input, plan_bodies,
 };
 use crate::ir::{Design, ExportKind, Joint, JointKind};
-use crate::kinematics::Motion;
 use nalgebra::Vector3;
 
 /// Sine of the angle between axes that count as parallel.
@@ -21,10 +20,9 @@ const PARALLEL: f64 = 1e-9;
 pub fn build(
     design: &Design,
     layout: &Layout,
-    motion: &Motion,
     model: &Model,
 ) -> Result<(Parts, Vec<Diagnostic>), Failed> {
-    let input = parts_input(design, layout, motion, model);
+    let input = parts_input(design, layout, model);
     let parts = build_parts(&input)
         .map_err(|e| vec![Diagnostic::error("E0630", format!("no solid comes out: {e}"), design.origin)])?;
     let found = parts.fusions.iter().map(|f| fusion(design, f)).collect();
@@ -75,9 +73,9 @@ pub fn available(design: &Design) -> Result<(), Failed> {
 /// Gaps of the planned solids over the cycle, flexures as polygons of the solver's edges (for 20 edges of 1.6 mm
 /// bent to a radius of 15 mm, 0.02 mm inside the arc); empty where there are no solids to measure (the mesh stage
 /// says why): a gap of parts that cannot be made yet would be a guess.
-pub fn gaps(design: &Design, layout: &Layout, motion: &Motion, model: &Model, cycle: &Cycle) -> CycleGaps {
+pub fn gaps(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> CycleGaps {
     let plans =
-        available(design).ok().and_then(|()| plan_bodies(&parts_input(design, layout, motion, model)).ok());
+        available(design).ok().and_then(|()| plan_bodies(&parts_input(design, layout, model)).ok());
     let Some(plans) = plans else {
         return CycleGaps::default();
     };
