@@ -6,6 +6,7 @@ use flexura::equilibrium::{Cycle, Layout, Model, SensitivityWorkspace, sweep};
 use flexura::ir::Design;
 use flexura::kinematics::solve_motion;
 use flexura::rod::RodModel;
+use nalgebra::DVector;
 
 mod common;
 
@@ -37,33 +38,55 @@ fn centrelines_follow_every_parameter() {
         let state = 2;
         let target: Vec<f64> = layout.drives.iter().map(|d| d.values[state] - d.rest).collect();
         let exact = workspace.at(&model, &at.states[state], &target).unwrap().centrelines;
-        for (i, free) in design.free.iter().enumerate() {
-            let h = 2e-4 * (free.upper - free.lower);
+        for seed in [1, 2] {
+            // A direction in the free variables that moves them all.
+            let d: Vec<f64> = common::noise(seed, p.len());
+            let d: Vec<f64> = d.iter().zip(&design.free).map(|(d, f)| d * (f.upper - f.lower)).collect();
+            let h = 1e-4;
             let shifted = |by: f64| {
-                let mut q = p.clone();
-                q[i] += by * h;
+                let q: Vec<f64> = p.iter().zip(&d).map(|(p, d)| p + by * h * d).collect();
                 cycle(&design, &layout, &q).1.states[state].state.rods.clone()
             };
-            let (a, b, c, d) = (shifted(-2.0), shifted(-1.0), shifted(1.0), shifted(2.0));
+            let (a, b, c, e) = (shifted(-2.0), shifted(-1.0), shifted(1.0), shifted(2.0));
+            let d = DVector::from_vec(d);
             for (r, jacobian) in exact.iter().enumerate() {
                 let m2 = |s: &flexura::rod::RodState, j: usize| {
                     (s.vertices[j + 1] - s.vertices[j]).normalize().cross(&s.m1[j])
                 };
                 let difference = |f: &dyn Fn(&flexura::rod::RodState) -> nalgebra::Vector3<f64>| {
-                    (f(&a[r]) - f(&b[r]) * 8.0 + f(&c[r]) * 8.0 - f(&d[r])) / (12.0 * h)
+                    (f(&a[r]) - f(&b[r]) * 8.0 + f(&c[r]) * 8.0 - f(&e[r])) / (12.0 * h)
                 };
-                let largest = jacobian.vertices.iter().map(|v| v.column(i).norm()).fold(0.1, f64::max);
+                let largest = jacobian.vertices.iter().map(|v| (v * &d).norm()).fold(0.1, f64::max);
                 for (k, by) in jacobian.vertices.iter().enumerate() {
                     let difference = difference(&|s| s.vertices[k]);
-                    let error = (difference - by.column(i)).norm() / largest;
-                    assert!(error < 1e-6, "{rod_model:?} {} rod {r} vertex {k}: {error:e}", free.path);
+                    let error = (difference - by * &d).norm() / largest;
+                    assert!(error < 1e-6, "{rod_model:?} rod {r} vertex {k}: {error:e}");
                 }
                 for (j, by) in jacobian.m2.iter().enumerate() {
                     let difference = difference(&|s| m2(s, j));
-                    let error = (difference - by.column(i)).norm() / largest;
-                    assert!(error < 1e-6, "{rod_model:?} {} rod {r} frame {j}: {error:e}", free.path);
+                    let error = (difference - by * &d).norm() / largest;
+                    assert!(error < 1e-6, "{rod_model:?} rod {r} frame {j}: {error:e}");
                 }
             }
+        }
+    }
+}
+
+#[test]
+fn explore() {
+    use flexura::ir::{Objective, ObjectiveKind};
+    use flexura::optimize::Problem;
+    let (mut design, layout) = example(12);
+    for gap_mm in [0.5, 1.0, 2.0, 4.0, 8.0, 12.0] {
+        design.objectives =
+            vec![Objective { kind: ObjectiveKind::Collision { gap_mm }, weight: 1e7, origin: design.origin }];
+        for edges in [10, 20, 40, 80] {
+            let problem = Problem::new(&design, &layout, edges);
+            let t = std::time::Instant::now();
+            let trial = problem.simulate(&problem.start()).unwrap();
+            let a = t.elapsed();
+            let d = problem.differentiate(&trial).unwrap();
+            println!("{gap_mm} {edges} {:?} {:?} {:?} {:.3e}", trial.terms, a, t.elapsed() - a, d.normal.gradient.norm());
         }
     }
 }

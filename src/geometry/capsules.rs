@@ -43,11 +43,7 @@ pub struct SkeletonCapsule {
 }
 
 /// The bodies' `plans` as capsules, with derivatives by the `parameters` design parameters of `model`. Nets of nodes and detours are those of the plans; only what a plan says it follows moves.
-pub fn skeleton_capsules(
-    plans: &[BodyPlan],
-    model: &Model,
-    parameters: usize,
-) -> Vec<SkeletonCapsule> {
+pub fn skeleton_capsules(plans: &[BodyPlan], model: &Model, parameters: usize) -> Vec<SkeletonCapsule> {
     let followed = Followed { rods: &model.rods, parameters };
     let fixed = Follow::default();
     let mut out = Vec::new();

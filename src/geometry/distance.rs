@@ -29,6 +29,16 @@ struct Vertex {
     on_a: Vector3<f64>,
 }
 
+/// Whether two slots are nearer to each other than a bound: most are told apart without the distance itself.
+pub fn nearer_than(a: &Slot, b: &Slot, bound_mm: f64) -> bool {
+    let (center, radius) = b.bounding_sphere();
+    let e = a.end - a.start;
+    let along = ((center - a.start).dot(&e) / e.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    let around = a.disc_radius_mm.hypot(a.half_height_mm) + a.round_mm;
+    let apart = (a.start + e * along - center).norm() - around - radius;
+    apart < bound_mm && separation(a, b).gap_mm < bound_mm
+}
+
 /// Signed distance of two slots.
 pub fn separation(a: &Slot, b: &Slot) -> Separation {
     let balls = a.round_mm + b.round_mm;

@@ -6,7 +6,7 @@
 //! is left (bars side by side under one boss) is kept apart by a small spread of heights.
 
 use super::anchor::{Anchor, FlexureEnd, Follow, SizeBy};
-use super::distance::separation;
+use super::distance::nearer_than;
 use super::mesh::Mesh;
 use super::parts::{Bore, Eye, FLOOR_MM, GeometryError, PartsInput};
 use super::skeleton::connect;
@@ -342,12 +342,8 @@ impl Builder<'_> {
         }
         let radius_by = SizeBy { a: f64::from(u8::from(a + wall > STUB_RADIUS_MM)), ..SizeBy::default() };
         let end = FlexureEnd { flexure: index, at_end, axis };
-        let along = |along_mm: f64, along: SizeBy, level: SizeBy| Anchor::Stub {
-            end,
-            along_mm,
-            along,
-            level,
-        };
+        let along =
+            |along_mm: f64, along: SizeBy, level: SizeBy| Anchor::Stub { end, along_mm, along, level };
         let reach = STUB_FREE_MM + self.boss_radius();
         let nose_anchor = along(radius - STUB_OVER_MM, radius_by, centred);
         self.push_following(
@@ -424,7 +420,7 @@ impl Builder<'_> {
     /// Whether a bar would run into a flexure, its own ones included, or into another body's stub.
     fn blocked(&self, p: &Vector3<f64>, q: &Vector3<f64>) -> bool {
         let bar = Slot::bar(*p, *q, self.axis(), self.bar_radius(), self.half() - BAR_BELOW_MM, ROUND_MM);
-        let hits = |s: &Slot| separation(&bar, s).gap_mm < self.input.clearance_mm;
+        let hits = |s: &Slot| nearer_than(&bar, s, self.input.clearance_mm);
         self.input.flexures.iter().any(|f| {
             let own = |at_end: bool| self.index == if at_end { f.bodies.1 } else { f.bodies.0 };
             let free = |s: &Slot| {

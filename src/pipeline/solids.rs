@@ -17,11 +17,7 @@ const PARALLEL: f64 = 1e-9;
 ///
 /// # Errors
 /// Where no solid comes out.
-pub fn build(
-    design: &Design,
-    layout: &Layout,
-    model: &Model,
-) -> Result<(Parts, Vec<Diagnostic>), Failed> {
+pub fn build(design: &Design, layout: &Layout, model: &Model) -> Result<(Parts, Vec<Diagnostic>), Failed> {
     let input = parts_input(design, layout, model);
     let parts = build_parts(&input)
         .map_err(|e| vec![Diagnostic::error("E0630", format!("no solid comes out: {e}"), design.origin)])?;
@@ -74,8 +70,7 @@ pub fn available(design: &Design) -> Result<(), Failed> {
 /// bent to a radius of 15 mm, 0.02 mm inside the arc); empty where there are no solids to measure (the mesh stage
 /// says why): a gap of parts that cannot be made yet would be a guess.
 pub fn gaps(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> CycleGaps {
-    let plans =
-        available(design).ok().and_then(|()| plan_bodies(&parts_input(design, layout, model)).ok());
+    let plans = available(design).ok().and_then(|()| plan_bodies(&parts_input(design, layout, model)).ok());
     let Some(plans) = plans else {
         return CycleGaps::default();
     };

@@ -35,7 +35,8 @@ impl RodSystem {
         let mut all = DMatrix::zeros(4 * n + 3, width);
         all.rows_mut(super::assemble::FIRST_INTERNAL, band).copy_from(&internal.rows(0, band));
         for end in 0..2 {
-            let mut carried = self.jacobians[end] * d_link.rows(6 * end, 6) + columns.ends[end] * dq.rows(0, PARAMETERS);
+            let mut carried =
+                self.jacobians[end] * d_link.rows(6 * end, 6) + columns.ends[end] * dq.rows(0, PARAMETERS);
             if end == 1 && columns.slip.is_some() {
                 // With shear, the chain ends short of link B by the slip.
                 let mut x = carried.rows_mut(0, 3);
