@@ -74,13 +74,25 @@ fn centrelines_follow_every_parameter() {
 
 #[test]
 fn explore() {
+    use flexura::geometry::*;
     use flexura::ir::{Objective, ObjectiveKind};
     use flexura::optimize::Problem;
-    let (mut design, layout) = example(12);
-    for gap_mm in [0.5, 1.0, 2.0, 4.0, 8.0, 12.0] {
+    let (mut design, layout) = example(60);
+    let p: Vec<f64> = design.free.iter().map(|f| f.start).collect();
+    for gap_mm in [0.5, 4.0] {
         design.objectives =
             vec![Objective { kind: ObjectiveKind::Collision { gap_mm }, weight: 1e7, origin: design.origin }];
-        for edges in [10, 20, 40, 80] {
+        for edges in [20] {
+            let t = std::time::Instant::now();
+            let model = Model::new(&design, &layout, &p, edges, true).unwrap();
+            let c = sweep(&model).unwrap();
+            println!("{gap_mm} sweep {:?} {}", t.elapsed(), c.states.len());
+            let t = std::time::Instant::now();
+            let plans = plan_bodies(&parts_input(&design, &layout, &model)).unwrap();
+            println!("{gap_mm} plans {:?}", t.elapsed());
+            let t = std::time::Instant::now();
+            let k = skeleton_capsules(&plans, &model, p.len());
+            println!("{gap_mm} capsules {:?} {}", t.elapsed(), k.len());
             let problem = Problem::new(&design, &layout, edges);
             let t = std::time::Instant::now();
             let trial = problem.simulate(&problem.start()).unwrap();

@@ -83,7 +83,7 @@ fn stress() {
 /// with flexure.
 #[test]
 fn collision() {
-    for gap_mm in [0.5, 12.0] {
+    for gap_mm in [4.0, 12.0] {
         check_gradient(ObjectiveKind::Collision { gap_mm });
     }
 }

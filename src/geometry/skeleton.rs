@@ -40,10 +40,13 @@ pub fn connect(points: &[Vector3<f64>], blocked: impl Fn(&Vector3<f64>, &Vector3
     }
     let hub = median(points);
     let tree: f64 = chain.iter().map(|(i, j)| between(*i, *j)).sum();
-    let star: f64 = points.iter().map(|p| cost(p, &hub)).sum();
+    let enough = (1.0 - HUB_SAVES) * tree;
+    let plain: f64 = points.iter().map(|p| (p - hub).norm()).sum();
+    // What runs into something only makes it dearer, and is dear to find out.
+    let star = if plain < enough { points.iter().map(|p| cost(p, &hub)).sum() } else { plain };
     // A hub that falls on a node is that node: the chain then is the star.
     let apart = points.iter().map(|p| (p - hub).norm()).fold(f64::INFINITY, f64::min);
-    if star < (1.0 - HUB_SAVES) * tree && apart > 2.0 {
+    if star < enough && apart > 2.0 {
         let edges = (0..points.len()).map(|i| (i, points.len())).collect();
         return Net { hub: Some(hub), edges };
     }
