@@ -98,7 +98,13 @@ fn explore() {
             let trial = problem.simulate(&problem.start()).unwrap();
             let a = t.elapsed();
             let d = problem.differentiate(&trial).unwrap();
-            println!("{gap_mm} {edges} {:?} {:?} {:?} {:.3e}", trial.terms, a, t.elapsed() - a, d.normal.gradient.norm());
+            println!(
+                "{gap_mm} {edges} {:?} {:?} {:?} {:.3e}",
+                trial.terms,
+                a,
+                t.elapsed() - a,
+                d.normal.gradient.norm()
+            );
         }
     }
 }
