@@ -58,6 +58,8 @@ pub struct Layout {
     pub closed: bool,
     /// Rest pose of each body relative to the drawing pose.
     pub rest_poses: Vec<Pose>,
+    /// Physical points of the joints in the drawing pose, mm.
+    pub joint_points: Vec<Vector3<f64>>,
     /// A typical length: lever of rotations in scaled systems, mm.
     pub length_mm: f64,
     /// Rod theory; the plain one unless set otherwise.
@@ -161,6 +163,7 @@ impl Layout {
             traces,
             closed,
             rest_poses,
+            joint_points: joint_points.clone(),
             length_mm,
             rod_model: RodModel::default(),
             changes: None,

@@ -5,7 +5,8 @@
 //! its neck, so that no two faces coincide and the boolean kernel meets only clear crossings. What
 //! is left (bars side by side under one boss) is kept apart by a small spread of heights.
 
-use super::distance::separation;
+use super::anchor::{Anchor, FlexureEnd, Follow, SizeBy};
+use super::distance::nearer_than;
 use super::mesh::Mesh;
 use super::parts::{Bore, Eye, FLOOR_MM, GeometryError, PartsInput};
 use super::skeleton::connect;
@@ -29,6 +30,8 @@ const STUB_FREE_MM: f64 = 3.0;
 /// How far a stub reaches over the attachment plane, mm: its round nose then holds the whole
 /// thickness of a flexure at that plane on average.
 const STUB_OVER_MM: f64 = 0.05;
+/// Least half height of a stub and of a neck, mm.
+const LEAST_HALF_MM: f64 = 0.1;
 /// How far a stub stays below the rim of a flexure that fills its sub-layer, mm.
 const STUB_BELOW_MM: f64 = 0.06;
 /// Rounding of edges, mm.
@@ -77,6 +80,8 @@ pub struct BoreCut {
 pub struct BodyPlan {
     /// What is united.
     pub slots: Vec<(Role, Slot)>,
+    /// What each slot follows when the flexures change.
+    pub follows: Vec<Follow>,
     /// What is then cut out.
     pub bores: Vec<BoreCut>,
     /// What the maker should know.
@@ -125,6 +130,8 @@ struct Node {
     at: Vector3<f64>,
     /// Eye in the body's own layer, if any: bars then end in necks at its slot's height.
     own_eye: Option<EyeShape>,
+    /// What it follows.
+    anchor: Anchor,
 }
 
 /// Measures of an eye.
@@ -163,7 +170,7 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
         }
     }
     for p in &body.skeleton {
-        b.node(*p, None);
+        b.node(*p, None, Anchor::Fixed);
     }
     if b.nodes.is_empty() {
         return Err(GeometryError::NoSkeleton(body.name.clone()));
@@ -194,12 +201,18 @@ impl Builder<'_> {
         p + self.axis() * (level - p.dot(&self.axis()))
     }
 
+    /// Adds a slot that is where the conventional mechanism puts it.
     fn push(&mut self, role: Role, slot: Slot) {
+        self.push_following(role, slot, Follow::default());
+    }
+
+    fn push_following(&mut self, role: Role, slot: Slot, follow: Follow) {
         self.plan.slots.push((role, slot));
+        self.plan.follows.push(follow);
     }
 
     /// The node at a place in plan, made if there is none.
-    fn node(&mut self, p: Vector3<f64>, own_eye: Option<EyeShape>) -> usize {
+    fn node(&mut self, p: Vector3<f64>, own_eye: Option<EyeShape>, anchor: Anchor) -> usize {
         let at = self.at_level(&p, self.level);
         if let Some(i) = self.nodes.iter().position(|n| (n.at - at).norm() < SAME_NODE_MM) {
             if self.nodes[i].own_eye.is_none() {
@@ -207,7 +220,7 @@ impl Builder<'_> {
             }
             return i;
         }
-        self.nodes.push(Node { at, own_eye });
+        self.nodes.push(Node { at, own_eye, anchor });
         self.nodes.len() - 1
     }
 
@@ -236,10 +249,11 @@ impl Builder<'_> {
         if (eye.point.dot(&self.axis()) - self.level).abs() < 0.5 * self.input.height_mm {
             let slot = Slot::bar(center, center, self.axis(), shape.radius, half, ROUND_MM);
             self.push(Role::Eye(eye.joint), slot);
-            self.node(eye.point, Some(shape));
+            self.node(eye.point, Some(shape), Anchor::Fixed);
         } else {
-            self.column(Role::Eye(eye.joint), &eye.point, (level - half, level + half), shape.radius);
-            self.node(eye.point, None);
+            let span = (level - half, level + half);
+            self.column(Role::Eye(eye.joint), &eye.point, span, shape.radius, &Anchor::Fixed);
+            self.node(eye.point, None, Anchor::Fixed);
         }
         self.bore(eye, &shape, name);
     }
@@ -296,6 +310,11 @@ impl Builder<'_> {
         let middle = p.dot(&axis);
         let level = flexure.joint_point.dot(&axis);
         let (mut low, mut high) = (middle - b - wall, middle + b + wall);
+        // Which of the two follow the flexure, and which are faces of the layer.
+        let mut follows = [
+            low >= level - self.half() || level - self.half() >= middle - b,
+            high <= level + self.half() || level + self.half() <= middle + b,
+        ];
         low = low.max(level - self.half()).min(middle - b);
         high = high.min(level + self.half()).max(middle + b);
         for other in self.input.flexures.iter().filter(|f| f.joint == flexure.joint && f.path != flexure.path)
@@ -303,8 +322,10 @@ impl Builder<'_> {
             let z = other.centreline.first().map_or(middle, |q| q.dot(&axis));
             if z < middle - 1e-6 {
                 low = middle - b;
+                follows[0] = true;
             } else if z > middle + 1e-6 {
                 high = middle + b;
+                follows[1] = true;
             }
         }
         let half_height =
@@ -312,22 +333,42 @@ impl Builder<'_> {
         let center = self.at_level(&p, (low + high) / 2.0);
         let nose = center + flat * (radius - STUB_OVER_MM);
         let root = center + flat * (STUB_FREE_MM + self.boss_radius());
-        self.push(
+        // The height of each face by the flexure, then of middle and half of the stub.
+        let [lower, upper] = follows.map(|f| if f { 1.0 } else { 0.0 });
+        let centred = SizeBy { level: 0.5 * (upper + lower), a: 0.0, b: 0.5 * (upper - lower) };
+        let mut half_by = SizeBy { level: 0.5 * (upper - lower), a: 0.0, b: 0.5 * (upper + lower) };
+        if half_height <= LEAST_HALF_MM {
+            half_by = SizeBy::default();
+        }
+        let radius_by = SizeBy { a: f64::from(u8::from(a + wall > STUB_RADIUS_MM)), ..SizeBy::default() };
+        let end = FlexureEnd { flexure: index, at_end, axis };
+        let along =
+            |along_mm: f64, along: SizeBy, level: SizeBy| Anchor::Stub { end, along_mm, along, level };
+        let reach = STUB_FREE_MM + self.boss_radius();
+        let nose_anchor = along(radius - STUB_OVER_MM, radius_by, centred);
+        self.push_following(
             Role::Stub(index),
-            Slot::bar(nose, root, axis, radius, half_height.max(0.1), STUB_ROUND_MM),
+            Slot::bar(nose, root, axis, radius, half_height.max(LEAST_HALF_MM), STUB_ROUND_MM),
+            Follow {
+                ends: [nose_anchor, along(reach, SizeBy::default(), centred)],
+                sized_by: Some(end),
+                radius: radius_by,
+                half_height: half_by,
+            },
         );
+        let anchor = along(reach, SizeBy::default(), SizeBy::default());
         if (level - self.level).abs() < 0.5 * self.input.height_mm {
-            self.boss(self.at_level(&root, self.level), self.boss_radius());
+            self.boss(self.at_level(&root, self.level), self.boss_radius(), &anchor);
         } else {
             let half = self.half() - BOSS_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len());
-            self.column(Role::Riser, &root, (level - half, level + half), self.boss_radius());
+            self.column(Role::Riser, &root, (level - half, level + half), self.boss_radius(), &anchor);
         }
-        self.node(root, None);
+        self.node(root, None, anchor);
         Ok(())
     }
 
     /// A full-height disc, unless something as wide stands there already.
-    fn boss(&mut self, at: Vector3<f64>, radius: f64) {
+    fn boss(&mut self, at: Vector3<f64>, radius: f64, anchor: &Anchor) {
         let half = self.half() - BOSS_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len());
         let axis = self.axis();
         let taken = self.plan.slots.iter().any(|(role, s)| {
@@ -339,17 +380,19 @@ impl Builder<'_> {
                 && s.radius_mm() >= radius - SPREAD_MM
         });
         if !taken {
-            self.push(Role::Boss, Slot::bar(at, at, axis, radius, half, ROUND_MM));
+            let slot = Slot::bar(at, at, axis, radius, half, ROUND_MM);
+            self.push_following(Role::Boss, slot, Follow::point(anchor));
         }
     }
 
     /// One upright cylinder from the body's own layer through `span` (levels) in another layer: a
     /// riser without steps.
-    fn column(&mut self, role: Role, at: &Vector3<f64>, span: (f64, f64), radius: f64) {
+    fn column(&mut self, role: Role, at: &Vector3<f64>, span: (f64, f64), radius: f64, anchor: &Anchor) {
         let half = self.half() - BOSS_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len());
         let (low, high) = (span.0.min(self.level - half), span.1.max(self.level + half));
         let middle = self.at_level(at, (low + high) / 2.0);
-        self.push(role, Slot::bar(middle, middle, self.axis(), radius, (high - low) / 2.0, ROUND_MM));
+        let slot = Slot::bar(middle, middle, self.axis(), radius, (high - low) / 2.0, ROUND_MM);
+        self.push_following(role, slot, Follow::point(anchor));
     }
 
     /// Bars between the nodes, in the body's own layer.
@@ -357,14 +400,17 @@ impl Builder<'_> {
         for i in 0..self.nodes.len() {
             let (at, is_eye) = (self.nodes[i].at, self.nodes[i].own_eye.is_some());
             if !is_eye {
-                self.boss(at, self.boss_radius());
+                let anchor = self.nodes[i].anchor.clone();
+                self.boss(at, self.boss_radius(), &anchor);
             }
         }
         let points: Vec<Vector3<f64>> = self.nodes.iter().map(|n| n.at).collect();
         let net = connect(&points, |p, q| self.blocked(p, q));
         if let Some(hub) = net.hub {
-            self.boss(hub, self.boss_radius());
-            self.nodes.push(Node { at: hub, own_eye: None });
+            let nodes = self.nodes.iter().map(|n| (n.at, n.anchor.clone())).collect();
+            let anchor = Anchor::Hub { nodes, at: hub };
+            self.boss(hub, self.boss_radius(), &anchor);
+            self.nodes.push(Node { at: hub, own_eye: None, anchor });
         }
         for (i, j) in net.edges {
             self.bar(i, j, name);
@@ -374,7 +420,7 @@ impl Builder<'_> {
     /// Whether a bar would run into a flexure, its own ones included, or into another body's stub.
     fn blocked(&self, p: &Vector3<f64>, q: &Vector3<f64>) -> bool {
         let bar = Slot::bar(*p, *q, self.axis(), self.bar_radius(), self.half() - BAR_BELOW_MM, ROUND_MM);
-        let hits = |s: &Slot| separation(&bar, s).gap_mm < self.input.clearance_mm;
+        let hits = |s: &Slot| nearer_than(&bar, s, self.input.clearance_mm);
         self.input.flexures.iter().any(|f| {
             let own = |at_end: bool| self.index == if at_end { f.bodies.1 } else { f.bodies.0 };
             let free = |s: &Slot| {
@@ -401,22 +447,38 @@ impl Builder<'_> {
         // The nose of the full-height piece stops short of the other bodies' eyes.
         let trim = |eye: &Option<EyeShape>| eye.map_or(0.0, |e| e.keep_out + radius);
         let (from, to) = (trim(&eyes.0), length - trim(&eyes.1));
+        let ends = [(p, self.nodes[i].anchor.clone()), (q, self.nodes[j].anchor.clone())];
         if eyes.0.is_none() && eyes.1.is_none() {
-            self.push(Role::Bar, Slot::bar(p, q, axis, radius, half, ROUND_MM));
+            let follow = Follow::bar(ends.map(|e| e.1));
+            self.push_following(Role::Bar, Slot::bar(p, q, axis, radius, half, ROUND_MM), follow);
             return;
         }
         if to - from < 0.0 {
             self.plan.notes.push(format!("`{name}`: two eyes stand too close for a bar between them."));
         }
+        let towards = |k: usize, along_mm: f64| Anchor::Toward {
+            nodes: Box::new([ends[k].clone(), ends[1 - k].clone()]),
+            along_mm,
+        };
+        // Where they are too close, both ends are that of the second eye.
+        let last = towards(1, length - to);
+        let first = if from <= to { towards(0, from) } else { towards(1, (length - to).min(length)) };
+        let anchors = [first, last];
         let (from, to) = (from.min(to).max(0.0), to.max(from.min(to)));
         let (start, end) = (p + along * from, p + along * to);
         let middle = (start + end) / 2.0;
-        self.push(Role::Bar, Slot::bar(start, end, axis, radius, half, ROUND_MM));
+        let halfway = Anchor::Middle(Box::new(anchors.clone()));
+        self.push_following(
+            Role::Bar,
+            Slot::bar(start, end, axis, radius, half, ROUND_MM),
+            Follow::bar(anchors),
+        );
         for eye in [eyes.0, eyes.1].into_iter().flatten() {
             let level = eye.center.dot(&axis);
             let neck = eye.half_height - BAR_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len());
             let inner = self.at_level(&middle, level);
-            self.push(Role::Bar, Slot::bar(eye.center, inner, axis, radius - 0.3, neck.max(0.1), ROUND_MM));
+            let slot = Slot::bar(eye.center, inner, axis, radius - 0.3, neck.max(LEAST_HALF_MM), ROUND_MM);
+            self.push_following(Role::Bar, slot, Follow::bar([Anchor::Fixed, halfway.clone()]));
         }
     }
 }

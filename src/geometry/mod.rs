@@ -3,18 +3,23 @@
 //!
 //! | file | holds |
 //! | --- | --- |
+//! | `input` | a design and its rods as the input of all others |
 //! | `parts` | the input, the grouping into printed parts, the build |
 //! | `link`, `skeleton` | a body as stubs, bosses, bars, eyes and risers |
+//! | `anchor`, `capsules` | how these follow the flexures; a body as capsules with derivatives by the design parameters |
 //! | `slot`, `sweep` | meshes of the primitives and of flexures |
 //! | `tidy` | removal of tiny edges before rounding to `f32` |
 //! | `union` | the boolean kernel's only client |
 //! | `mesh`, `check`, `ray` | triangle meshes, their facts, measurements on them |
 //! | `distance`, `gap`, `cycle` | least distances, overlaps in the rest pose, gaps over a cycle |
 
+pub mod anchor;
+pub mod capsules;
 pub mod check;
 pub mod cycle;
 pub mod distance;
 pub mod gap;
+pub mod input;
 pub mod link;
 pub mod mesh;
 pub mod parts;
@@ -28,9 +33,12 @@ pub mod union;
 #[cfg(test)]
 mod tests;
 
+pub use anchor::{Anchor, FlexureEnd, Follow, SizeBy};
+pub use capsules::{SkeletonCapsule, skeleton_capsules};
 pub use check::{MeshFacts, check_mesh};
 pub use cycle::{CycleGaps, LeastGap, MovedState, cycle_gaps};
 pub use gap::{Fusion, Member};
+pub use input::{flexure_solid, parts_input};
 pub use mesh::Mesh;
 pub use parts::{
     BodySolid, Bore, Eye, FlexureSolid, GeometryError, Part, Parts, PartsInput, build_parts, plan_bodies,

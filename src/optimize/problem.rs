@@ -7,6 +7,7 @@ use super::objectives::{self, Level, StateView, StatesSensitivity, Term};
 use crate::equilibrium::{
     Cycle, Equilibrium, Layout, Model, PointForce, PointForceChange, SensitivityWorkspace, Solver, sweep,
 };
+use crate::geometry::{SkeletonCapsule, parts_input, plan_bodies, skeleton_capsules};
 use crate::ir::Design;
 use crate::kinematics::solve_motion;
 use rayon::prelude::*;
@@ -27,6 +28,8 @@ pub struct Problem<'d> {
     /// Largest sample of each soft maximum at the first point simulated: what its sharpness refers to.
     references: OnceLock<Vec<f64>>,
     edges: usize,
+    /// Whether a term sees the links' shapes.
+    needs_links: bool,
     simulations: AtomicUsize,
 }
 
@@ -46,6 +49,8 @@ pub struct Trial<'d> {
     levels: Vec<Option<Level>>,
     /// Per load case one force a state.
     cases: Vec<Vec<PointForce>>,
+    /// The links' shapes; empty where no term sees them.
+    capsules: Vec<SkeletonCapsule>,
     /// Per counted state its equilibria under the load cases; empty without load cases.
     loaded: Vec<Vec<Equilibrium>>,
 }
@@ -101,6 +106,7 @@ impl<'d> Problem<'d> {
             cases,
             references: OnceLock::new(),
             edges,
+            needs_links: objectives::needs_links(design),
             simulations: AtomicUsize::new(0),
         }
     }
@@ -157,8 +163,10 @@ impl<'d> Problem<'d> {
         let model = Model::new(self.design, layout, &p, self.edges, true).ok()?;
         let cycle = sweep(&model).ok()?;
         let loaded = self.load(&model, &cycle, &cases)?;
-        let views: Vec<StateView> =
-            (0..self.layout.counted_states()).map(|s| self.view(&model, &cycle, &loaded, s)).collect();
+        let capsules = self.links(&model, p.len())?;
+        let views: Vec<StateView> = (0..self.layout.counted_states())
+            .map(|s| self.view(&model, &cycle, &loaded, &capsules, s))
+            .collect();
         let references = self.references.get_or_init(|| {
             let largest = |o: &Term| match o {
                 Term::Sum(_) => 0.0,
@@ -184,7 +192,8 @@ impl<'d> Problem<'d> {
         drop(views);
         terms.push(guards::cost(&model));
         let cost: f64 = terms.iter().sum();
-        cost.is_finite().then(|| Trial { x: x.to_vec(), model, cycle, cost, terms, levels, cases, loaded })
+        let made = Trial { x: x.to_vec(), model, cycle, cost, terms, levels, cases, capsules, loaded };
+        cost.is_finite().then_some(made)
     }
 
     /// The layout at parameters `p`: followed anew from the drawing where they move the geometry, always on the way of
@@ -197,6 +206,15 @@ impl<'d> Problem<'d> {
         let mut layout = Layout::new(self.design, &motion, p);
         layout.rod_model = self.layout.rod_model;
         Some(Cow::Owned(layout))
+    }
+
+    /// The links' shapes, where a term sees them; none where a link has none.
+    fn links(&self, model: &Model<'d>, parameters: usize) -> Option<Vec<SkeletonCapsule>> {
+        if !self.needs_links {
+            return Some(Vec::new());
+        }
+        let plans = plan_bodies(&parts_input(self.design, &model.layout, model)).ok()?;
+        Some(skeleton_capsules(&plans, model, parameters))
     }
 
     /// Equilibria under the load cases; none where one cannot be found.
@@ -229,6 +247,7 @@ impl<'d> Problem<'d> {
         model: &'a Model<'d>,
         cycle: &'a Cycle,
         loaded: &'a [Vec<Equilibrium>],
+        capsules: &'a [SkeletonCapsule],
         state: usize,
     ) -> StateView<'a> {
         StateView {
@@ -237,6 +256,7 @@ impl<'d> Problem<'d> {
             loaded: loaded.get(state).map_or(&[], |l| l),
             state,
             share: objectives::STEPS_OF_WEIGHTS / self.layout.counted_states() as f64,
+            capsules,
         }
     }
 
@@ -249,10 +269,10 @@ impl<'d> Problem<'d> {
         let parts: Vec<Option<Vec<Normal>>> = (0..self.layout.counted_states())
             .into_par_iter()
             .map_init(
-                || SensitivityWorkspace::new(&trial.model),
+                || SensitivityWorkspace::new(&trial.model).with_centrelines(self.needs_links),
                 |workspace, s| {
                     let target = target(&trial.model, s);
-                    let view = self.view(&trial.model, &trial.cycle, &trial.loaded, s);
+                    let view = self.view(&trial.model, &trial.cycle, &trial.loaded, &trial.capsules, s);
                     let free = workspace.at(&trial.model, view.equilibrium, &target).ok()?;
                     let loaded = trial
                         .cases

@@ -72,7 +72,7 @@ impl Stages for Compiler {
     }
 
     fn simulate(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
-        let (layout, motion) = layout(design, values)?;
+        let (layout, _) = layout(design, values)?;
         let model = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
         let cycle = sweep(&model).map_err(|e| lost(design, &e))?;
         let states = cycle.states.iter().enumerate().map(|(s, e)| MotionState {
@@ -94,7 +94,7 @@ impl Stages for Compiler {
             })
             .collect();
         let mut diagnostics = judge(design, &layout, &cycle);
-        let gaps = solids::gaps(design, &layout, &motion, &model, &cycle);
+        let gaps = solids::gaps(design, &layout, &model, &cycle);
         diagnostics.extend(solids::collisions(design, &gaps));
         let gaps_mm = gaps.least.iter().filter_map(|g| g.map(|g| g.gap_mm)).collect();
         let motion = table(design, true, states.collect());
@@ -111,6 +111,18 @@ impl Stages for Compiler {
         let (layout, _) = layout(design, start)?;
         if layout.changes.is_none() {
             return Err(vec![dead_point(design)]);
+        }
+        if let Some(term) =
+            design.objectives.iter().find(|o| matches!(o.kind, ObjectiveKind::Collision { .. }))
+        {
+            let asks = |d: Diagnostic| {
+                d.also(term.origin, "this term sees the printed form").help(
+                    "without `collision` and `export stl` the mechanism can be checked, simulated and solved",
+                )
+            };
+            solids::available(design)
+                .map_err(|found| found.into_iter().map(asks).collect::<Vec<Diagnostic>>())?;
+            solids::plannable(design, &layout, start, EDGES)?;
         }
         let problem = Problem::new(design, &layout, EDGES);
         let names = problem.term_names();
@@ -157,9 +169,9 @@ impl Stages for Compiler {
 
     fn mesh(&self, design: &Design, values: &[f64]) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
         solids::available(design)?;
-        let (layout, motion) = layout(design, values)?;
+        let (layout, _) = layout(design, values)?;
         let model = Model::new(design, &layout, values, MESH_EDGES, false).map_err(|e| no_rod(design, &e))?;
-        let (parts, found) = solids::build(design, &layout, &motion, &model)?;
+        let (parts, found) = solids::build(design, &layout, &model)?;
         let mut artefacts = Vec::new();
         for part in &parts.parts {
             let bytes = stl_bytes(&part.mesh).map_err(|e| {
