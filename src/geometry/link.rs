@@ -7,7 +7,7 @@
 
 use super::distance::separation;
 use super::mesh::Mesh;
-use super::parts::{Bore, Eye, FLOOR_MM, GeometryError, PartsInput};
+use super::parts::{Bore, Eye, FLOOR_MM, FlexureSolid, GeometryError, PartsInput};
 use super::skeleton::connect;
 use super::slot::{Facets, Slot};
 use nalgebra::Vector3;
@@ -15,34 +15,36 @@ use nalgebra::Vector3;
 /// Half width of a bar as a part of the layer's height.
 const BAR_PER_HEIGHT: f64 = 0.35;
 /// Radius of a boss or plain eye beyond the bar's half width, mm.
-const BOSS_EXTRA_MM: f64 = 0.4;
+pub(super) const BOSS_EXTRA_MM: f64 = 0.4;
 /// How far the top of a boss stays below its layer's face, mm.
-const BOSS_BELOW_MM: f64 = 0.02;
+pub(super) const BOSS_BELOW_MM: f64 = 0.02;
 /// How far the top of a bar stays below its layer's face, mm.
-const BAR_BELOW_MM: f64 = 0.25;
+pub(super) const BAR_BELOW_MM: f64 = 0.25;
 /// Largest spread of heights and widths that keeps like faces apart, mm.
-const SPREAD_MM: f64 = 0.08;
+pub(super) const SPREAD_MM: f64 = 0.08;
 /// Half width of a stub, mm; more where a thick flexure needs it.
-const STUB_RADIUS_MM: f64 = 2.2;
+pub(super) const STUB_RADIUS_MM: f64 = 2.2;
 /// Length of a stub in front of its boss, mm.
-const STUB_FREE_MM: f64 = 3.0;
+pub(super) const STUB_FREE_MM: f64 = 3.0;
 /// How far a stub reaches over the attachment plane, mm: its round nose then holds the whole
 /// thickness of a flexure at that plane on average.
-const STUB_OVER_MM: f64 = 0.05;
+pub(super) const STUB_OVER_MM: f64 = 0.05;
 /// How far a stub stays below the rim of a flexure that fills its sub-layer, mm.
-const STUB_BELOW_MM: f64 = 0.06;
+pub(super) const STUB_BELOW_MM: f64 = 0.06;
 /// Rounding of edges, mm.
-const ROUND_MM: f64 = 0.8;
+pub(super) const ROUND_MM: f64 = 0.8;
 /// Rounding of a stub's edges, mm: small, so that the flexure's clamp is as wide as the flexure.
-const STUB_ROUND_MM: f64 = 0.5;
+pub(super) const STUB_ROUND_MM: f64 = 0.5;
 /// Wall round a bore, mm; the process's least wall if that is more.
 const BORE_WALL_MM: f64 = 2.0;
 /// Kept beyond the clearance, so that rounding cannot eat it, mm.
-const CLEAR_MM: f64 = 0.01;
+pub(super) const CLEAR_MM: f64 = 0.01;
 /// Next to its attachment a flexure may be nearer to its own link's bars than the clearance, mm.
 const OWN_ROOT_MM: f64 = 2.0;
+/// Sine of the angle by which axes and ends may differ in a body of layers: rounding of the rest pose.
+const FLAT: f64 = 1e-6;
 /// Points nearer than this in plan are one node, mm.
-const SAME_NODE_MM: f64 = 1.0;
+pub(super) const SAME_NODE_MM: f64 = 1.0;
 
 /// What a slot of a body is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,35 +117,37 @@ impl BodyPlan {
 }
 
 /// Spread in 0..1 by the golden ratio: any two small indices get clearly different values.
-fn spread(i: usize) -> f64 {
+pub(super) fn spread(i: usize) -> f64 {
     (i as f64 * 0.618_033_988_749_894_9 + 0.137).fract()
 }
 
-/// A place in plan where something of the body ends.
-struct Node {
-    /// At the body's own level.
-    at: Vector3<f64>,
+/// A place where something of the body ends.
+pub(super) struct Node {
+    /// At the body's own level, if it has one.
+    pub(super) at: Vector3<f64>,
     /// Eye in the body's own layer, if any: bars then end in necks at its slot's height.
-    own_eye: Option<EyeShape>,
+    pub(super) own_eye: Option<EyeShape>,
 }
 
 /// Measures of an eye.
 #[derive(Clone, Copy)]
-struct EyeShape {
-    center: Vector3<f64>,
-    radius: f64,
-    half_height: f64,
+pub(super) struct EyeShape {
+    pub(super) center: Vector3<f64>,
+    pub(super) radius: f64,
+    pub(super) half_height: f64,
     /// Radius to be kept free for the other bodies at this joint.
-    keep_out: f64,
+    pub(super) keep_out: f64,
 }
 
 /// Shared state while one body is planned.
-struct Builder<'a> {
-    input: &'a PartsInput,
-    plan: BodyPlan,
-    nodes: Vec<Node>,
-    level: f64,
-    index: usize,
+pub(super) struct Builder<'a> {
+    pub(super) input: &'a PartsInput,
+    pub(super) plan: BodyPlan,
+    pub(super) nodes: Vec<Node>,
+    /// Axis of the body's own layers; of no meaning for a body in space.
+    pub(super) axis: Vector3<f64>,
+    pub(super) level: f64,
+    pub(super) index: usize,
 }
 
 /// Plans one body.
@@ -151,7 +155,18 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
     let Some(body) = input.bodies.get(index) else {
         return Err(GeometryError::Input(format!("there is no body {index}")));
     };
-    let mut b = Builder { input, plan: BodyPlan::default(), nodes: Vec::new(), level: body.level_mm, index };
+    let mut b = Builder {
+        input,
+        plan: BodyPlan::default(),
+        nodes: Vec::new(),
+        axis: body.axis.unwrap_or_else(Vector3::z),
+        level: body.level_mm,
+        index,
+    };
+    if body.axis.is_none_or(|axis| !lies_flat(input, index, &axis)) {
+        b.plan_in_space(body)?;
+        return Ok(b.plan);
+    }
     for eye in &body.eyes {
         b.add_eye(eye, &body.name);
     }
@@ -172,12 +187,27 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
     Ok(b.plan)
 }
 
+/// Whether everything that ends in a body can be made in layers along an axis: eyes along it, leaves across it, no
+/// rod that leaves along it.
+fn lies_flat(input: &PartsInput, index: usize, axis: &Vector3<f64>) -> bool {
+    let eyes = input.bodies[index].eyes.iter().all(|e| e.axis.cross(axis).norm() < FLAT);
+    let flat = |f: &FlexureSolid, at_end: bool| {
+        let wide = if at_end { f.m2.last() } else { f.m2.first() };
+        let (a, b) = f.end_axes(at_end);
+        let upright = a == b || wide.is_some_and(|m| m.cross(axis).norm() < FLAT);
+        let off = (f.end_point(at_end) - f.joint_point).dot(axis).abs();
+        upright && f.outward(at_end).dot(axis).abs() < FLAT && off + b <= input.height_mm / 2.0 + FLAT
+    };
+    let ends = |f: &FlexureSolid, body: usize, at_end: bool| body != index || flat(f, at_end);
+    eyes && input.flexures.iter().all(|f| ends(f, f.bodies.0, false) && ends(f, f.bodies.1, true))
+}
+
 impl Builder<'_> {
     fn axis(&self) -> Vector3<f64> {
-        self.input.axis
+        self.axis
     }
 
-    fn half(&self) -> f64 {
+    pub(super) fn half(&self) -> f64 {
         self.input.height_mm / 2.0
     }
 
@@ -194,7 +224,7 @@ impl Builder<'_> {
         p + self.axis() * (level - p.dot(&self.axis()))
     }
 
-    fn push(&mut self, role: Role, slot: Slot) {
+    pub(super) fn push(&mut self, role: Role, slot: Slot) {
         self.plan.slots.push((role, slot));
     }
 
@@ -212,7 +242,7 @@ impl Builder<'_> {
     }
 
     /// Measures of an eye: its share of the joint's layer, and the radius all of them need.
-    fn eye_shape(&self, eye: &Eye) -> EyeShape {
+    pub(super) fn eye_shape(&self, eye: &Eye) -> EyeShape {
         let (k, n) = (eye.slot.0 as f64, eye.slot.1 as f64);
         let c = self.input.clearance_mm;
         let share = (self.input.height_mm - (n - 1.0) * c) / n;
@@ -222,7 +252,7 @@ impl Builder<'_> {
             |bore: &Bore| self.boss_radius().max(bore.diameter_mm().map_or(0.0, |d| d / 2.0 + wall));
         let others = self.input.bodies.iter().flat_map(|b| &b.eyes).filter(|e| e.joint == eye.joint);
         EyeShape {
-            center: eye.point + self.axis() * middle,
+            center: eye.point + eye.axis * middle,
             radius: radius_of(&eye.bore),
             half_height: share / 2.0,
             keep_out: others.map(|e| radius_of(&e.bore)).fold(0.0, f64::max) + c + CLEAR_MM,
@@ -244,8 +274,8 @@ impl Builder<'_> {
         self.bore(eye, &shape, name);
     }
 
-    fn bore(&mut self, eye: &Eye, shape: &EyeShape, name: &str) {
-        let axis = self.axis();
+    pub(super) fn bore(&mut self, eye: &Eye, shape: &EyeShape, name: &str) {
+        let axis = eye.axis;
         let c = self.input.clearance_mm;
         match eye.bore {
             Bore::Solid => self.plan.notes.push(format!(
@@ -269,8 +299,13 @@ impl Builder<'_> {
                 }
             }
             Bore::Through { diameter_mm } => {
-                let joint_level = eye.point.dot(&axis);
-                let reach = (joint_level - self.level).abs() + self.input.height_mm;
+                // A body in space is passed within the joint's own stack.
+                let layers = if self.input.bodies[self.index].axis.is_some() {
+                    (eye.point.dot(&axis) - self.level).abs()
+                } else {
+                    0.0
+                };
+                let reach = layers + self.input.height_mm;
                 let (start, end) = (eye.point - axis * reach, eye.point + axis * reach);
                 self.plan.bores.push(BoreCut { joint: eye.joint, start, end, diameter_mm });
             }
@@ -371,10 +406,14 @@ impl Builder<'_> {
         }
     }
 
-    /// Whether a bar would run into a flexure, its own ones included, or into another body's stub.
+    /// The same for a bar in the body's own layer.
     fn blocked(&self, p: &Vector3<f64>, q: &Vector3<f64>) -> bool {
-        let bar = Slot::bar(*p, *q, self.axis(), self.bar_radius(), self.half() - BAR_BELOW_MM, ROUND_MM);
-        let hits = |s: &Slot| separation(&bar, s).gap_mm < self.input.clearance_mm;
+        self.hits(&Slot::bar(*p, *q, self.axis(), self.bar_radius(), self.half() - BAR_BELOW_MM, ROUND_MM))
+    }
+
+    /// Whether a bar would run into a flexure, its own ones included, or into another body's stub.
+    pub(super) fn hits(&self, bar: &Slot) -> bool {
+        let hits = |s: &Slot| separation(bar, s).gap_mm < self.input.clearance_mm;
         self.input.flexures.iter().any(|f| {
             let own = |at_end: bool| self.index == if at_end { f.bodies.1 } else { f.bodies.0 };
             let free = |s: &Slot| {

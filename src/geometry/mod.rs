@@ -5,6 +5,7 @@
 //! | --- | --- |
 //! | `parts` | the input, the grouping into printed parts, the build |
 //! | `link`, `skeleton` | a body as stubs, bosses, bars, eyes and risers |
+//! | `space` | a body whose joints point different ways |
 //! | `slot`, `sweep` | meshes of the primitives and of flexures |
 //! | `tidy` | removal of tiny edges before rounding to `f32` |
 //! | `union` | the boolean kernel's only client |
@@ -21,6 +22,7 @@ pub mod parts;
 pub mod ray;
 pub mod skeleton;
 pub mod slot;
+mod space;
 pub mod sweep;
 pub mod tidy;
 pub mod union;

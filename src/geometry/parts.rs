@@ -22,8 +22,6 @@ pub const FLOOR_MM: f64 = 1.2;
 /// Everything the printed parts are made of, in the rest pose; lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartsInput {
-    /// Unit axis along which planar links are stacked.
-    pub axis: Vector3<f64>,
     /// Height of a layer.
     pub height_mm: f64,
     /// Least clearance between moving parts.
@@ -39,11 +37,14 @@ pub struct PartsInput {
 }
 
 /// A rigid body as a skeleton to be fleshed out.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct BodySolid {
     /// Name.
     pub name: String,
-    /// Height of the middle of the body's own layer, measured along the stacking axis from the origin.
+    /// Unit axis of the body's own layers, in which it is built of upright bars; none for a body whose joints point
+    /// different ways: it is a net of round bars in space.
+    pub axis: Option<Vector3<f64>>,
+    /// Height of the middle of the body's own layer, measured along its axis from the origin.
     pub level_mm: f64,
     /// Points the link must reach at its own level (their height along the axis is ignored): points listed for
     /// the body and conventional joints. Points of compliant joints do not belong here: there the
@@ -60,7 +61,9 @@ pub struct Eye {
     pub joint: usize,
     /// The joint's physical point, in the middle of its layer.
     pub point: Vector3<f64>,
-    /// The hole along the stacking axis.
+    /// Unit axis of the joint, the same for all its bodies.
+    pub axis: Vector3<f64>,
+    /// The hole along the axis.
     pub bore: Bore,
     /// This body is number `slot.0`, counted from 0 upwards along the axis, of `slot.1` bodies.
     pub slot: (usize, usize),
@@ -236,15 +239,16 @@ fn build_part(input: &PartsInput, plans: &[BodyPlan], bodies: &[usize]) -> Resul
 fn validate(input: &PartsInput) -> Result<(), GeometryError> {
     let fail = |text: String| Err(GeometryError::Input(text));
     let finite = |p: &Vector3<f64>| p.iter().all(|x| x.is_finite() && x.abs() < 1e6);
-    if (input.axis.norm() - 1.0).abs() > 1e-6 || !finite(&input.axis) {
-        return fail("the stacking axis is not a unit vector".into());
-    }
     let positive = |x: f64| x.is_finite() && x > 0.0;
     if !positive(input.height_mm) || !positive(input.clearance_mm) || !positive(input.least_wall_mm) {
         return fail("layer height, clearance and least wall must be positive".into());
     }
     for body in &input.bodies {
         let points = body.skeleton.iter().chain(body.eyes.iter().map(|e| &e.point));
+        let unit = |a: &Vector3<f64>| finite(a) && (a.norm() - 1.0).abs() < 1e-6;
+        if !body.axis.iter().chain(body.eyes.iter().map(|e| &e.axis)).all(unit) {
+            return fail(format!("an axis of `{}` is not a unit vector", body.name));
+        }
         if !points.clone().all(finite) || !body.level_mm.is_finite() {
             return fail(format!("a point of `{}` is not finite", body.name));
         }
