@@ -66,6 +66,10 @@ pub struct Layout {
     pub closed: bool,
     /// Rest pose of each body relative to the drawing pose.
     pub rest_poses: Vec<Pose>,
+    /// Physical points of the joints in the drawing pose, mm.
+    pub joint_points: Vec<Vector3<f64>>,
+    /// How the conventional mechanism moves: the pose of every body in each state, relative to rest.
+    pub conventional: Vec<Vec<Pose>>,
     /// A typical length: lever of rotations in scaled systems, mm.
     pub length_mm: f64,
     /// Rod theory; the plain one unless set otherwise.
@@ -192,6 +196,8 @@ impl Layout {
             traces,
             closed,
             rest_poses,
+            joint_points: joint_points.clone(),
+            conventional: motion.states.iter().map(|s| relative(&s.poses, rest)).collect(),
             length_mm,
             rod_model: RodModel::default(),
         }
@@ -211,4 +217,16 @@ impl Layout {
     pub fn counted_states(&self) -> usize {
         if self.closed && self.states() > 1 { self.states() - 1 } else { self.states() }
     }
+}
+
+/// Poses relative to rest of poses that are relative to the drawing, as those of the rest pose are.
+fn relative(poses: &[Pose], rest: &[Pose]) -> Vec<Pose> {
+    let zero = Vector3::zeros();
+    let pair = |(pose, rest): (&Pose, &Pose)| {
+        let rotation = pose.rotation * rest.rotation.transpose();
+        // The drawing's origin lies at rest.point(0) in the rest pose.
+        let translation = pose.point(&zero) - rotation * rest.point(&zero);
+        Pose { rotation, translation, center: zero }
+    };
+    poses.iter().zip(rest).map(pair).collect()
 }

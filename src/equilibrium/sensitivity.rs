@@ -4,7 +4,7 @@
 use super::load::PointForce;
 use super::model::Model;
 use super::newton::{Equilibrium, SolveError, Solver};
-use crate::rod::{PARAMETERS, StrainJacobian};
+use crate::rod::{CentrelineJacobian, PARAMETERS, StrainJacobian};
 use nalgebra::{DMatrix, DVector};
 
 /// First derivatives of one equilibrium by the n design parameters.
@@ -18,17 +18,26 @@ pub struct Sensitivity {
     pub directions: Vec<DMatrix<f64>>,
     /// Per rod its strain measures with their derivatives by those 29 directions.
     pub strains: Vec<StrainJacobian>,
+    /// Per rod where it is, by the n; empty unless asked for ([`SensitivityWorkspace::with_centrelines`]).
+    pub centrelines: Vec<CentrelineJacobian>,
 }
 
 /// Reused by one thread.
 pub struct SensitivityWorkspace {
     solver: Solver,
+    centrelines: bool,
 }
 
 impl SensitivityWorkspace {
     /// For models of this size.
     pub fn new(model: &Model) -> Self {
-        Self { solver: Solver::new(model) }
+        Self { solver: Solver::new(model), centrelines: false }
+    }
+
+    /// The same, with the derivatives of the centrelines if `wanted`.
+    pub fn with_centrelines(mut self, wanted: bool) -> Self {
+        self.centrelines = wanted;
+        self
     }
 
     /// Derivatives at an accepted equilibrium with the drives held.
@@ -79,6 +88,7 @@ impl SensitivityWorkspace {
         }
         let mut directions = Vec::with_capacity(model.rods.len());
         let mut strains = Vec::with_capacity(model.rods.len());
+        let mut centrelines = Vec::new();
         for (rod, system) in model.rods.iter().zip(&solver.systems) {
             let mut own = DMatrix::zeros(12 + PARAMETERS, parameters);
             for (half, body) in rod.bodies.into_iter().enumerate() {
@@ -87,6 +97,11 @@ impl SensitivityWorkspace {
                 }
             }
             own.rows_mut(12, PARAMETERS).copy_from(&rod.dq_dp);
+            if self.centrelines {
+                let links = own.rows(0, 12).into_owned();
+                let jacobian = system.centreline_jacobian(&rod.rod, &links, &rod.dq_dp);
+                centrelines.push(jacobian.map_err(|_| SolveError::NoDerivatives)?);
+            }
             directions.push(own);
             strains.push(system.strain_jacobian(&rod.rod).map_err(|_| SolveError::NoDerivatives)?);
         }
@@ -95,6 +110,7 @@ impl SensitivityWorkspace {
             lambda: rhs.rows(n, m).into_owned(),
             directions,
             strains,
+            centrelines,
         })
     }
 }

@@ -5,12 +5,15 @@
 //! its neck, so that no two faces coincide and the boolean kernel meets only clear crossings. What
 //! is left (bars side by side under one boss) is kept apart by a small spread of heights.
 
+use super::anchor::{Anchor, FlexureEnd, Follow, SizeBy};
 use super::distance::separation;
 use super::mesh::Mesh;
 use super::parts::{Bore, Eye, FLOOR_MM, FlexureSolid, GeometryError, PartsInput};
+use super::riser::Near;
 use super::skeleton::connect;
 use super::slot::{Facets, Slot};
 use nalgebra::Vector3;
+use std::cell::OnceCell;
 
 /// Half width of a bar as a part of the layer's height.
 const BAR_PER_HEIGHT: f64 = 0.35;
@@ -29,6 +32,8 @@ pub(super) const STUB_FREE_MM: f64 = 3.0;
 /// How far a stub reaches over the attachment plane, mm: its round nose then holds the whole
 /// thickness of a flexure at that plane on average.
 pub(super) const STUB_OVER_MM: f64 = 0.05;
+/// Least half height of a stub and of a neck, mm.
+pub(super) const LEAST_HALF_MM: f64 = 0.1;
 /// How far a stub stays below the rim of a flexure that fills its sub-layer, mm.
 pub(super) const STUB_BELOW_MM: f64 = 0.06;
 /// Rounding of edges, mm.
@@ -59,6 +64,8 @@ pub enum Role {
     Eye(usize),
     /// Joins layers.
     Riser,
+    /// Sleeve or bar of the conventional slider with this index.
+    Guide(usize),
 }
 
 /// A cylinder to be taken out of a body.
@@ -79,6 +86,8 @@ pub struct BoreCut {
 pub struct BodyPlan {
     /// What is united.
     pub slots: Vec<(Role, Slot)>,
+    /// What each slot follows when the flexures change.
+    pub follows: Vec<Follow>,
     /// What is then cut out.
     pub bores: Vec<BoreCut>,
     /// What the maker should know.
@@ -127,6 +136,8 @@ pub(super) struct Node {
     pub(super) at: Vector3<f64>,
     /// Eye in the body's own layer, if any: bars then end in necks at its slot's height.
     pub(super) own_eye: Option<EyeShape>,
+    /// What it follows.
+    pub(super) anchor: Anchor,
 }
 
 /// Measures of an eye.
@@ -148,6 +159,10 @@ pub(super) struct Builder<'a> {
     pub(super) axis: Vector3<f64>,
     pub(super) level: f64,
     pub(super) index: usize,
+    /// What moves beside the body, seen from it; found when first asked for.
+    pub(super) moving: OnceCell<Vec<Near>>,
+    /// Places of eyes in other layers that cannot be reached straight.
+    pub(super) risen: Vec<Vector3<f64>>,
 }
 
 /// Plans one body.
@@ -158,6 +173,8 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
     let mut b = Builder {
         input,
         plan: BodyPlan::default(),
+        moving: OnceCell::new(),
+        risen: Vec::new(),
         nodes: Vec::new(),
         axis: body.axis.unwrap_or_else(Vector3::z),
         level: body.level_mm,
@@ -177,9 +194,14 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
             }
         }
     }
-    for p in &body.skeleton {
-        b.node(*p, None);
+    for guide in &body.guides {
+        b.add_guide(guide, false)?;
     }
+    let guided = |p: &Vector3<f64>| body.guides.iter().any(|g| (g.point - p).norm() < SAME_NODE_MM);
+    for p in body.skeleton.iter().filter(|p| !guided(p) && !b.is_risen(p)).copied().collect::<Vec<_>>() {
+        b.node(p, None, Anchor::Fixed);
+    }
+    b.rise_beside();
     if b.nodes.is_empty() {
         return Err(GeometryError::NoSkeleton(body.name.clone()));
     }
@@ -203,7 +225,7 @@ fn lies_flat(input: &PartsInput, index: usize, axis: &Vector3<f64>) -> bool {
 }
 
 impl Builder<'_> {
-    fn axis(&self) -> Vector3<f64> {
+    pub(super) fn axis(&self) -> Vector3<f64> {
         self.axis
     }
 
@@ -211,25 +233,31 @@ impl Builder<'_> {
         self.input.height_mm / 2.0
     }
 
-    fn bar_radius(&self) -> f64 {
+    pub(super) fn bar_radius(&self) -> f64 {
         self.input.height_mm * BAR_PER_HEIGHT
     }
 
-    fn boss_radius(&self) -> f64 {
+    pub(super) fn boss_radius(&self) -> f64 {
         self.bar_radius() + BOSS_EXTRA_MM
     }
 
     /// A point moved along the axis to a level.
-    fn at_level(&self, p: &Vector3<f64>, level: f64) -> Vector3<f64> {
+    pub(super) fn at_level(&self, p: &Vector3<f64>, level: f64) -> Vector3<f64> {
         p + self.axis() * (level - p.dot(&self.axis()))
     }
 
+    /// Adds a slot that is where the conventional mechanism puts it.
     pub(super) fn push(&mut self, role: Role, slot: Slot) {
+        self.push_following(role, slot, Follow::default());
+    }
+
+    pub(super) fn push_following(&mut self, role: Role, slot: Slot, follow: Follow) {
         self.plan.slots.push((role, slot));
+        self.plan.follows.push(follow);
     }
 
     /// The node at a place in plan, made if there is none.
-    fn node(&mut self, p: Vector3<f64>, own_eye: Option<EyeShape>) -> usize {
+    pub(super) fn node(&mut self, p: Vector3<f64>, own_eye: Option<EyeShape>, anchor: Anchor) -> usize {
         let at = self.at_level(&p, self.level);
         if let Some(i) = self.nodes.iter().position(|n| (n.at - at).norm() < SAME_NODE_MM) {
             if self.nodes[i].own_eye.is_none() {
@@ -237,7 +265,7 @@ impl Builder<'_> {
             }
             return i;
         }
-        self.nodes.push(Node { at, own_eye });
+        self.nodes.push(Node { at, own_eye, anchor });
         self.nodes.len() - 1
     }
 
@@ -266,10 +294,19 @@ impl Builder<'_> {
         if (eye.point.dot(&self.axis()) - self.level).abs() < 0.5 * self.input.height_mm {
             let slot = Slot::bar(center, center, self.axis(), shape.radius, half, ROUND_MM);
             self.push(Role::Eye(eye.joint), slot);
-            self.node(eye.point, Some(shape));
+            self.node(eye.point, Some(shape), Anchor::Fixed);
         } else {
-            self.column(Role::Eye(eye.joint), &eye.point, (level - half, level + half), shape.radius);
-            self.node(eye.point, None);
+            let span = (level - half, level + half);
+            let straight = self.column_slot(&eye.point, span, shape.radius);
+            if self.meets_moving(&straight) {
+                // Bars and stubs come first: the way round leads to them.
+                self.risen.push(eye.point);
+                let slot = Slot::bar(center, center, self.axis(), shape.radius, half, ROUND_MM);
+                self.push(Role::Eye(eye.joint), slot);
+            } else {
+                self.column(Role::Eye(eye.joint), &eye.point, span, shape.radius, &Anchor::Fixed);
+                self.node(eye.point, None, Anchor::Fixed);
+            }
         }
         self.bore(eye, &shape, name);
     }
@@ -331,6 +368,11 @@ impl Builder<'_> {
         let middle = p.dot(&axis);
         let level = flexure.joint_point.dot(&axis);
         let (mut low, mut high) = (middle - b - wall, middle + b + wall);
+        // Which of the two follow the flexure, and which are faces of the layer.
+        let mut follows = [
+            low >= level - self.half() || level - self.half() >= middle - b,
+            high <= level + self.half() || level + self.half() <= middle + b,
+        ];
         low = low.max(level - self.half()).min(middle - b);
         high = high.min(level + self.half()).max(middle + b);
         for other in self.input.flexures.iter().filter(|f| f.joint == flexure.joint && f.path != flexure.path)
@@ -338,8 +380,10 @@ impl Builder<'_> {
             let z = other.centreline.first().map_or(middle, |q| q.dot(&axis));
             if z < middle - 1e-6 {
                 low = middle - b;
+                follows[0] = true;
             } else if z > middle + 1e-6 {
                 high = middle + b;
+                follows[1] = true;
             }
         }
         let half_height =
@@ -347,22 +391,63 @@ impl Builder<'_> {
         let center = self.at_level(&p, (low + high) / 2.0);
         let nose = center + flat * (radius - STUB_OVER_MM);
         let root = center + flat * (STUB_FREE_MM + self.boss_radius());
-        self.push(
+        // The height of each face by the flexure, then of middle and half of the stub.
+        let [lower, upper] = follows.map(|f| if f { 1.0 } else { 0.0 });
+        let centred = SizeBy { level: 0.5 * (upper + lower), a: 0.0, b: 0.5 * (upper - lower) };
+        let mut half_by = SizeBy { level: 0.5 * (upper - lower), a: 0.0, b: 0.5 * (upper + lower) };
+        if half_height <= LEAST_HALF_MM {
+            half_by = SizeBy::default();
+        }
+        let radius_by = SizeBy { a: f64::from(u8::from(a + wall > STUB_RADIUS_MM)), ..SizeBy::default() };
+        let end = FlexureEnd { flexure: index, at_end, axis };
+        let along =
+            |along_mm: f64, along: SizeBy, level: SizeBy| Anchor::Stub { end, along_mm, along, level };
+        let reach = STUB_FREE_MM + self.boss_radius();
+        let nose_anchor = along(radius - STUB_OVER_MM, radius_by, centred);
+        self.push_following(
             Role::Stub(index),
-            Slot::bar(nose, root, axis, radius, half_height.max(0.1), STUB_ROUND_MM),
+            Slot::bar(nose, root, axis, radius, half_height.max(LEAST_HALF_MM), STUB_ROUND_MM),
+            Follow {
+                ends: [nose_anchor, along(reach, SizeBy::default(), centred)],
+                sized_by: Some(end),
+                radius: radius_by,
+                half_height: half_by,
+            },
         );
+        let anchor = along(reach, SizeBy::default(), SizeBy::default());
         if (level - self.level).abs() < 0.5 * self.input.height_mm {
-            self.boss(self.at_level(&root, self.level), self.boss_radius());
+            self.boss(self.at_level(&root, self.level), self.boss_radius(), &anchor);
         } else {
             let half = self.half() - BOSS_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len());
-            self.column(Role::Riser, &root, (level - half, level + half), self.boss_radius());
+            let span = (level - half, level + half);
+            let straight = self.column_slot(&root, span, self.boss_radius());
+            let on_level = self.at_level(&root, level);
+            let arm = |foot: &Vector3<f64>| {
+                Slot::bar(on_level, *foot, axis, self.bar_radius(), half - BAR_BELOW_MM, ROUND_MM)
+            };
+            let foot = if self.meets_moving(&straight) {
+                self.foot(&on_level, span, self.bar_radius(), arm)
+            } else {
+                None
+            };
+            if let Some(foot) = foot {
+                // It stays where it is beside the stub.
+                let (arm, radius) = (arm(&foot), self.bar_radius());
+                let boss = Slot::bar(on_level, on_level, axis, self.boss_radius(), half, ROUND_MM);
+                self.push_following(Role::Boss, boss, Follow::point(&anchor));
+                self.push_following(Role::Bar, arm, Follow::point(&anchor));
+                self.column(Role::Riser, &foot, span, radius + 0.5 * BOSS_EXTRA_MM, &anchor);
+                self.node(foot, None, anchor);
+                return Ok(());
+            }
+            self.column(Role::Riser, &root, span, self.boss_radius(), &anchor);
         }
-        self.node(root, None);
+        self.node(root, None, anchor);
         Ok(())
     }
 
     /// A full-height disc, unless something as wide stands there already.
-    fn boss(&mut self, at: Vector3<f64>, radius: f64) {
+    pub(super) fn boss(&mut self, at: Vector3<f64>, radius: f64, anchor: &Anchor) {
         let half = self.half() - BOSS_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len());
         let axis = self.axis();
         let taken = self.plan.slots.iter().any(|(role, s)| {
@@ -374,17 +459,30 @@ impl Builder<'_> {
                 && s.radius_mm() >= radius - SPREAD_MM
         });
         if !taken {
-            self.push(Role::Boss, Slot::bar(at, at, axis, radius, half, ROUND_MM));
+            let slot = Slot::bar(at, at, axis, radius, half, ROUND_MM);
+            self.push_following(Role::Boss, slot, Follow::point(anchor));
         }
     }
 
     /// One upright cylinder from the body's own layer through `span` (levels) in another layer: a
     /// riser without steps.
-    fn column(&mut self, role: Role, at: &Vector3<f64>, span: (f64, f64), radius: f64) {
+    pub(super) fn column(
+        &mut self,
+        role: Role,
+        at: &Vector3<f64>,
+        span: (f64, f64),
+        radius: f64,
+        anchor: &Anchor,
+    ) {
+        let slot = self.column_slot(at, span, radius);
+        self.push_following(role, slot, Follow::point(anchor));
+    }
+
+    pub(super) fn column_slot(&self, at: &Vector3<f64>, span: (f64, f64), radius: f64) -> Slot {
         let half = self.half() - BOSS_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len());
         let (low, high) = (span.0.min(self.level - half), span.1.max(self.level + half));
         let middle = self.at_level(at, (low + high) / 2.0);
-        self.push(role, Slot::bar(middle, middle, self.axis(), radius, (high - low) / 2.0, ROUND_MM));
+        Slot::bar(middle, middle, self.axis(), radius, (high - low) / 2.0, ROUND_MM)
     }
 
     /// Bars between the nodes, in the body's own layer.
@@ -392,14 +490,17 @@ impl Builder<'_> {
         for i in 0..self.nodes.len() {
             let (at, is_eye) = (self.nodes[i].at, self.nodes[i].own_eye.is_some());
             if !is_eye {
-                self.boss(at, self.boss_radius());
+                let anchor = self.nodes[i].anchor.clone();
+                self.boss(at, self.boss_radius(), &anchor);
             }
         }
         let points: Vec<Vector3<f64>> = self.nodes.iter().map(|n| n.at).collect();
         let net = connect(&points, |p, q| self.blocked(p, q));
         if let Some(hub) = net.hub {
-            self.boss(hub, self.boss_radius());
-            self.nodes.push(Node { at: hub, own_eye: None });
+            let nodes = self.nodes.iter().map(|n| (n.at, n.anchor.clone())).collect();
+            let anchor = Anchor::Hub { nodes, at: hub };
+            self.boss(hub, self.boss_radius(), &anchor);
+            self.nodes.push(Node { at: hub, own_eye: None, anchor });
         }
         for (i, j) in net.edges {
             self.bar(i, j, name);
@@ -408,7 +509,9 @@ impl Builder<'_> {
 
     /// The same for a bar in the body's own layer.
     fn blocked(&self, p: &Vector3<f64>, q: &Vector3<f64>) -> bool {
-        self.hits(&Slot::bar(*p, *q, self.axis(), self.bar_radius(), self.half() - BAR_BELOW_MM, ROUND_MM))
+        let half = self.half() - BAR_BELOW_MM;
+        let bar = Slot::bar(*p, *q, self.axis(), self.bar_radius(), half, ROUND_MM);
+        self.hits(&bar) || self.in_guide(&bar, false)
     }
 
     /// Whether a bar would run into a flexure, its own ones included, or into another body's stub.
@@ -440,22 +543,38 @@ impl Builder<'_> {
         // The nose of the full-height piece stops short of the other bodies' eyes.
         let trim = |eye: &Option<EyeShape>| eye.map_or(0.0, |e| e.keep_out + radius);
         let (from, to) = (trim(&eyes.0), length - trim(&eyes.1));
+        let ends = [(p, self.nodes[i].anchor.clone()), (q, self.nodes[j].anchor.clone())];
         if eyes.0.is_none() && eyes.1.is_none() {
-            self.push(Role::Bar, Slot::bar(p, q, axis, radius, half, ROUND_MM));
+            let follow = Follow::bar(ends.map(|e| e.1));
+            self.push_following(Role::Bar, Slot::bar(p, q, axis, radius, half, ROUND_MM), follow);
             return;
         }
         if to - from < 0.0 {
             self.plan.notes.push(format!("`{name}`: two eyes stand too close for a bar between them."));
         }
+        let towards = |k: usize, along_mm: f64| Anchor::Toward {
+            nodes: Box::new([ends[k].clone(), ends[1 - k].clone()]),
+            along_mm,
+        };
+        // Where they are too close, both ends are that of the second eye.
+        let last = towards(1, length - to);
+        let first = if from <= to { towards(0, from) } else { towards(1, (length - to).min(length)) };
+        let anchors = [first, last];
         let (from, to) = (from.min(to).max(0.0), to.max(from.min(to)));
         let (start, end) = (p + along * from, p + along * to);
         let middle = (start + end) / 2.0;
-        self.push(Role::Bar, Slot::bar(start, end, axis, radius, half, ROUND_MM));
+        let halfway = Anchor::Middle(Box::new(anchors.clone()));
+        self.push_following(
+            Role::Bar,
+            Slot::bar(start, end, axis, radius, half, ROUND_MM),
+            Follow::bar(anchors),
+        );
         for eye in [eyes.0, eyes.1].into_iter().flatten() {
             let level = eye.center.dot(&axis);
             let neck = eye.half_height - BAR_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len());
             let inner = self.at_level(&middle, level);
-            self.push(Role::Bar, Slot::bar(eye.center, inner, axis, radius - 0.3, neck.max(0.1), ROUND_MM));
+            let slot = Slot::bar(eye.center, inner, axis, radius - 0.3, neck.max(LEAST_HALF_MM), ROUND_MM);
+            self.push_following(Role::Bar, slot, Follow::bar([Anchor::Fixed, halfway.clone()]));
         }
     }
 }

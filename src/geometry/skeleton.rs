@@ -1,7 +1,7 @@
 //! How a body's nodes are joined by bars: a chain (minimum spanning tree, Prim 1957) or a hub at the
 //! geometric median (Weiszfeld 1937), whichever needs less bar.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Bars between nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -14,6 +14,9 @@ pub struct Net {
 
 /// Steps of Weiszfeld's iteration: converged to 1e-6 of the size for link-like point sets.
 const MEDIAN_STEPS: usize = 200;
+
+/// Steps of Newton's method after that.
+const POLISH_STEPS: usize = 4;
 
 /// A hub must save this part of the chain's length: an equal chain looks and prints simpler.
 const HUB_SAVES: f64 = 0.02;
@@ -83,5 +86,42 @@ fn median(points: &[Vector3<f64>]) -> Vector3<f64> {
         }
         x = sum / weight;
     }
+    // To rounding, as long as that helps: at a node, where the distance has no derivative, it does not.
+    for _ in 0..POLISH_STEPS {
+        let (pull, hessian) = pull(points, &x);
+        let Some(inverse) = hessian.try_inverse() else { break };
+        let next = x - inverse * pull;
+        let length = |x: &Vector3<f64>| points.iter().map(|p| (p - x).norm()).sum::<f64>();
+        // Rounding of the sum must not stop a step that still matters.
+        if !next.iter().all(|v| v.is_finite()) || length(&next) > length(&x) * (1.0 + 1e-14) {
+            break;
+        }
+        x = next;
+    }
     x
+}
+
+/// Gradient of the sum of distances and its Hessian.
+fn pull(points: &[Vector3<f64>], x: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
+    let (mut gradient, mut hessian) = (Vector3::zeros(), Matrix3::zeros());
+    for p in points {
+        let (u, curvature) = direction(p, x);
+        gradient += u;
+        hessian += curvature;
+    }
+    (gradient, hessian)
+}
+
+/// From a node to the median: unit vector, and the Hessian of the distance.
+fn direction(p: &Vector3<f64>, x: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
+    let d = x - p;
+    let length = d.norm().max(1e-9);
+    let u = d / length;
+    (u, (Matrix3::identity() - u * u.transpose()) / length)
+}
+
+/// Derivatives of the median by each of its nodes: Σ u = 0 differentiated implicitly.
+pub fn median_derivative(points: &[Vector3<f64>], median: &Vector3<f64>) -> Vec<Matrix3<f64>> {
+    let inverse = pull(points, median).1.try_inverse().unwrap_or_else(Matrix3::zeros);
+    points.iter().map(|p| inverse * direction(p, median).1).collect()
 }

@@ -133,6 +133,7 @@ pub fn chebyshev(bulge_deg: f64, facets: Facets) -> PartsInput {
         level_mm: layer * pitch,
         skeleton,
         eyes,
+        guides: Vec::new(),
     };
     let eye = |joint: usize, point: Vector3<f64>, bore: Bore, slot: usize| Eye {
         joint,
@@ -185,6 +186,7 @@ pub fn chebyshev(bulge_deg: f64, facets: Facets) -> PartsInput {
         least_wall_mm: 0.6,
         bodies,
         flexures,
+        motion: Vec::new(),
         facets,
     }
 }
