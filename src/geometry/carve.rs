@@ -19,10 +19,10 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Step of the grid that holds what a flexure sweeps, mm.
-const STEP_MM: f64 = 0.45;
+const STEP_MM: f64 = 0.6;
 /// Taken out beyond the clearance, mm: covers the facets of the grid, and the scallops between two shapes that are
 /// [`MOVE_MM`] apart.
-const MARGIN_MM: f64 = 0.1;
+const MARGIN_MM: f64 = 0.12;
 /// A flexure moves by this at most between two shapes that are taken out, mm.
 const MOVE_MM: f64 = 0.5;
 /// Shapes between two states at most.

@@ -84,22 +84,8 @@ impl Builder<'_> {
         let role = Role::Guide(guide.joint);
         let radius = self.stop_radius(in_space);
         if guide.sleeve {
-            let plate = |middle: Vector3<f64>, axis: Vector3<f64>, core: f64, thick: f64, half: f64| Slot {
-                start: middle - s * (half - thick / 2.0),
-                end: middle + s * (half - thick / 2.0),
-                axis,
-                disc_radius_mm: 0.0,
-                half_height_mm: core,
-                round_mm: thick / 2.0,
-            };
-            let thin = sizes.wall - THINNER_MM;
-            for sign in [1.0, -1.0] {
-                let middle = guide.point + n * (sign * (sizes.outer - sizes.wall / 2.0));
-                let slot = plate(middle, side, sizes.outer - sizes.wall / 2.0, sizes.wall, sizes.half);
+            for slot in self.sleeve(guide, -sizes.half, sizes.half) {
                 self.push(role, slot);
-                let middle = guide.point + side * (sign * (sizes.inner + thin / 2.0));
-                let half = sizes.half - 2.0 * THINNER_MM;
-                self.push(role, plate(middle, n, sizes.outer - sizes.wall, thin, half));
             }
             let out = sizes.inner + NOT_THROUGH_MM + radius;
             let mut places = vec![guide.point + side * out, guide.point - side * out];
@@ -142,29 +128,48 @@ impl Builder<'_> {
         }
     }
 
+    /// The four plates of a sleeve between two places along its direction.
+    fn sleeve(&self, guide: &Guide, from: f64, to: f64) -> [Slot; 4] {
+        let sizes = self.guide_sizes();
+        let (s, n) = (guide.direction, guide.normal);
+        let side = n.cross(&s);
+        let plate = |middle: Vector3<f64>, axis: Vector3<f64>, core: f64, thick: f64, less: f64| Slot {
+            start: middle + s * (from + less + thick / 2.0),
+            end: middle + s * (to - less - thick / 2.0),
+            axis,
+            disc_radius_mm: 0.0,
+            half_height_mm: core,
+            round_mm: thick / 2.0,
+        };
+        let thin = sizes.wall - THINNER_MM;
+        let flat = |sign: f64| {
+            let middle = guide.point + n * (sign * (sizes.outer - sizes.wall / 2.0));
+            plate(middle, side, sizes.outer - sizes.wall / 2.0, sizes.wall, 0.0)
+        };
+        let upright = |sign: f64| {
+            let middle = guide.point + side * (sign * (sizes.inner + thin / 2.0));
+            plate(middle, n, sizes.outer - sizes.wall, thin, 2.0 * THINNER_MM)
+        };
+        [flat(1.0), flat(-1.0), upright(1.0), upright(-1.0)]
+    }
+
     /// Whether a bar of this body would stand in the way of one of its own sliders.
     pub(super) fn in_guide(&self, bar: &Slot, in_space: bool) -> bool {
         let sizes = self.guide_sizes();
         let Some(body) = self.input.bodies.get(self.index) else { return false };
         body.guides.iter().any(|g| {
             let (low, high) = g.travel_mm;
-            // The way of the bar through the sleeve, or of the sleeve along the bar.
-            let (half, from, to) = if g.sleeve {
+            if g.sleeve {
+                // The way of the bar through the sleeve.
                 let (first, last) = self.bar_ends(g, in_space);
-                (sizes.inner, first + low, last + high)
-            } else {
-                (sizes.outer, -sizes.half - high, sizes.half - low)
-            };
-            let shorter = half.min((to - from) / 2.0);
-            let (start, end) =
-                (g.point + g.direction * (from + shorter), g.point + g.direction * (to - shorter));
-            let room = Slot {
-                disc_radius_mm: 0.0,
-                half_height_mm: 0.0,
-                round_mm: half,
-                ..Slot::capsule(start, end, half)
-            };
-            separation(bar, &Slot { axis: g.normal, ..room }).gap_mm < 0.0
+                let (start, end) =
+                    (g.point + g.direction * (first + low), g.point + g.direction * (last + high));
+                let room = Slot::bar(start, end, g.normal, sizes.inner, sizes.inner, EDGE_MM);
+                return separation(bar, &room).gap_mm < 0.0;
+            }
+            // The way of the sleeve along the bar.
+            let room = self.sleeve(g, -sizes.half - high, sizes.half - low);
+            room.iter().any(|plate| separation(bar, plate).gap_mm < self.input.clearance_mm)
         })
     }
 }

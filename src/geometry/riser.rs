@@ -140,10 +140,20 @@ impl Builder<'_> {
         }
         for flexure in &self.input.flexures {
             for (own, at_end) in [(flexure.bodies.0, false), (flexure.bodies.1, true)] {
-                if own == index {
-                    let (at, out) = (flexure.end_point(at_end), flexure.outward(at_end));
-                    let radius = STUB_RADIUS_MM.max(flexure.end_axes(at_end).0);
-                    slots.push(Slot::capsule(at, at + out * (STUB_FREE_MM + self.boss_radius()), radius));
+                if own != index {
+                    continue;
+                }
+                let (at, out) = (flexure.end_point(at_end), flexure.outward(at_end));
+                let radius = STUB_RADIUS_MM.max(flexure.end_axes(at_end).0);
+                let root = at + out * (STUB_FREE_MM + self.boss_radius());
+                slots.push(Slot::capsule(at, root, radius));
+                let Some(axis) = body.axis else { continue };
+                let level = flexure.joint_point.dot(&axis);
+                if (level - body.level_mm).abs() >= self.half() {
+                    let (low, high) = (level.min(body.level_mm), level.max(body.level_mm));
+                    let middle = root + axis * ((low + high) / 2.0 - root.dot(&axis));
+                    let reach = (high - low) / 2.0 + self.half() - BOSS_BELOW_MM;
+                    slots.push(Slot::bar(middle, middle, axis, self.boss_radius(), reach, ROUND_MM));
                 }
             }
         }
