@@ -60,6 +60,8 @@ pub struct Layout {
     pub rest_poses: Vec<Pose>,
     /// Physical points of the joints in the drawing pose, mm.
     pub joint_points: Vec<Vector3<f64>>,
+    /// How the conventional mechanism moves: the pose of every body in each state, relative to rest.
+    pub conventional: Vec<Vec<Pose>>,
     /// A typical length: lever of rotations in scaled systems, mm.
     pub length_mm: f64,
     /// Rod theory; the plain one unless set otherwise.
@@ -164,6 +166,7 @@ impl Layout {
             closed,
             rest_poses,
             joint_points: joint_points.clone(),
+            conventional: motion.states.iter().map(|s| relative(&s.poses, rest)).collect(),
             length_mm,
             rod_model: RodModel::default(),
             changes: None,
@@ -198,4 +201,16 @@ impl From<Layout> for Cow<'_, Layout> {
     fn from(layout: Layout) -> Self {
         Cow::Owned(layout)
     }
+}
+
+/// Poses relative to rest of poses that are relative to the drawing, as those of the rest pose are.
+fn relative(poses: &[Pose], rest: &[Pose]) -> Vec<Pose> {
+    let zero = Vector3::zeros();
+    let pair = |(pose, rest): (&Pose, &Pose)| {
+        let rotation = pose.rotation * rest.rotation.transpose();
+        // The drawing's origin lies at rest.point(0) in the rest pose.
+        let translation = pose.point(&zero) - rotation * rest.point(&zero);
+        Pose { rotation, translation, center: zero }
+    };
+    poses.iter().zip(rest).map(pair).collect()
 }

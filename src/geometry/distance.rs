@@ -108,6 +108,13 @@ fn closest(s: &[Vertex]) -> [f64; 4] {
     }
 }
 
+/// The point of a triangle nearest to a point.
+pub(super) fn point_triangle(p: &Vector3<f64>, corners: &[Vector3<f64>; 3]) -> Vector3<f64> {
+    let [a, b, c] = corners.map(|q| q - p);
+    let [u, v, w] = triangle(&a, &b, &c);
+    corners[0] * u + corners[1] * v + corners[2] * w
+}
+
 fn segment(p: &Vector3<f64>, q: &Vector3<f64>) -> [f64; 2] {
     let d = q - p;
     let n = d.norm_squared();

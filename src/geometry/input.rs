@@ -1,9 +1,10 @@
 //! From a design and its rods at given parameters to the input of the solids.
 
+use super::layers::{guides, joint_axis, layers};
 use super::parts::{BodySolid, Bore, Eye, FlexureSolid, PartsInput};
 use super::slot::Facets;
 use crate::equilibrium::{Layout, Model};
-use crate::ir::{BodyId, Design, Joint, JointId, Realization};
+use crate::ir::{BodyId, Design, Joint, JointId, JointKind, Realization};
 use crate::rod::RodState;
 use nalgebra::Vector3;
 
@@ -16,7 +17,6 @@ const SHAFT_FIT: f64 = 0.5;
 pub fn parts_input(design: &Design, layout: &Layout, model: &Model) -> PartsInput {
     let values = design.exprs.values(&model.p);
     let drawn = |p: [crate::ir::expr::ExprId; 3]| Vector3::from(p.map(|id| values[id.0 as usize]));
-    let pitch = design.layers.pitch_mm;
     let bodies = design
         .bodies
         .iter()
@@ -29,19 +29,25 @@ pub fn parts_input(design: &Design, layout: &Layout, model: &Model) -> PartsInpu
             };
             let skeleton = body.skeleton.iter().map(|p| drawn(p.position)).filter(|p| !flexed(p));
             let eyes =
-                design.joints.iter().enumerate().filter(|(_, j)| !j.is_compliant() && j.bodies.contains(&b));
+                design.joints.iter().enumerate().filter(|(_, j)| {
+                    !j.is_compliant() && j.kind == JointKind::Hinge && j.bodies.contains(&b)
+                });
+            let layers = layers(design, layout, b, &drawn);
             BodySolid {
                 name: body.name.clone(),
-                level_mm: f64::from(body.layer) * pitch,
+                axis: layers.map(|(axis, _)| axis),
+                level_mm: layers.map_or(0.0, |(_, level)| level),
                 skeleton: skeleton.map(|p| layout.rest_poses[b].point(&p)).collect(),
                 eyes: eyes
                     .map(|(j, joint)| Eye {
                         joint: j,
                         point: layout.rest_poses[b].point(&layout.joint_points[j]),
+                        axis: joint_axis(design, layout, joint),
                         bore: bore(design, j, joint, b),
                         slot: slot(design, joint, b),
                     })
                     .collect(),
+                guides: guides(design, layout, b),
             }
         })
         .collect();
@@ -55,12 +61,12 @@ pub fn parts_input(design: &Design, layout: &Layout, model: &Model) -> PartsInpu
         })
         .collect();
     PartsInput {
-        axis: Vector3::from(design.layers.axis),
         height_mm: design.layers.height_mm,
         clearance_mm: design.process.clearance_mm,
         least_wall_mm: design.process.least_wall_mm,
         bodies,
         flexures,
+        motion: layout.conventional.clone(),
         facets: Facets::default(),
     }
 }

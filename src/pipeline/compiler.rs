@@ -94,7 +94,8 @@ impl Stages for Compiler {
             })
             .collect();
         let mut diagnostics = judge(design, &layout, &cycle);
-        let gaps = solids::gaps(design, &layout, &model, &cycle);
+        let (gaps, carving) = solids::gaps(design, &layout, &model, &cycle);
+        diagnostics.extend(solids::not_carved(design, &carving));
         diagnostics.extend(solids::collisions(design, &gaps));
         let gaps_mm = gaps.least.iter().filter_map(|g| g.map(|g| g.gap_mm)).collect();
         let motion = table(design, true, states.collect());
@@ -171,7 +172,11 @@ impl Stages for Compiler {
         solids::available(design)?;
         let (layout, _) = layout(design, values)?;
         let model = Model::new(design, &layout, values, MESH_EDGES, false).map_err(|e| no_rod(design, &e))?;
-        let (parts, found) = solids::build(design, &layout, &model)?;
+        // What flexures sweep over the cycle is taken out of their own links.
+        let solved = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
+        let cycle = sweep(&solved).map_err(|e| lost(design, &e))?;
+        let states = solids::states(design, &layout, &solved, &cycle);
+        let (parts, found) = solids::build(design, &layout, &model, &states)?;
         let mut artefacts = Vec::new();
         for part in &parts.parts {
             let bytes = stl_bytes(&part.mesh).map_err(|e| {

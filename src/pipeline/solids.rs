@@ -4,22 +4,24 @@ use super::stages::Failed;
 use crate::diagnostic::Diagnostic;
 use crate::equilibrium::{Cycle, Layout, Model};
 use crate::geometry::{
-    CycleGaps, Fusion, GeometryError, LeastGap, Member, MovedState, Parts, build_parts, cycle_gaps,
-    flexure_solid, parts_input, plan_bodies,
+    Carving, Cut, CycleGaps, Fusion, GeometryError, LeastGap, Member, MovedState, Parts, build_carved_parts,
+    carve, carved_cycle_gaps, flexure_solid, parts_input, plan_bodies,
 };
 use crate::ir::{Design, ExportKind, Joint, JointKind};
-use nalgebra::Vector3;
 
-/// Sine of the angle between axes that count as parallel.
-const PARALLEL: f64 = 1e-9;
-
-/// Builds the printed parts of a design in its rest pose.
+/// Builds the printed parts of a design in its rest pose; links make way for their own flexures in the `states` of the
+/// cycle.
 ///
 /// # Errors
 /// Where no solid comes out.
-pub fn build(design: &Design, layout: &Layout, model: &Model) -> Result<(Parts, Vec<Diagnostic>), Failed> {
+pub fn build(
+    design: &Design,
+    layout: &Layout,
+    model: &Model,
+    states: &[MovedState],
+) -> Result<(Parts, Vec<Diagnostic>), Failed> {
     let input = parts_input(design, layout, model);
-    let parts = build_parts(&input).map_err(|e| no_solid(design, &e))?;
+    let parts = build_carved_parts(&input, states).map_err(|e| no_solid(design, &e))?;
     let found = parts.fusions.iter().map(|f| fusion(design, f)).collect();
     Ok((parts, found))
 }
@@ -43,16 +45,11 @@ fn no_solid(design: &Design, error: &GeometryError) -> Failed {
 /// # Errors
 /// Joints whose form is not there yet, each at its place.
 pub fn available(design: &Design) -> Result<(), Failed> {
-    let missing = |joint: &&Joint| {
-        let plain = joint.kind == JointKind::Hinge && joint.bodies.len() == 2;
-        !joint.is_compliant() && !plain
-    };
+    let missing =
+        |joint: &&Joint| !joint.is_compliant() && !matches!(joint.kind, JointKind::Hinge | JointKind::Slider);
     let told = |joint: &Joint| {
-        let what = match joint.kind {
-            JointKind::Hinge => "hinge of more than two bodies".to_string(),
-            kind => format!("{} joint", kind.name()),
-        };
-        let message = format!("the printed form of a conventional {what} is not available yet");
+        let what = joint.kind.name();
+        let message = format!("the printed form of a conventional {what} joint is not available yet");
         let found = Diagnostic::error("E0901", message, joint.origin);
         match design.exports.iter().find(|e| e.kind == ExportKind::Stl) {
             Some(export) => found.also(export.origin, "asked for here"),
@@ -61,48 +58,60 @@ pub fn available(design: &Design) -> Result<(), Failed> {
         .help("without `export stl` the mechanism can be checked, simulated and solved")
     };
     let found: Vec<Diagnostic> = design.joints.iter().filter(missing).map(told).collect();
+    if found.is_empty() { Ok(()) } else { Err(found) }
+}
 
-    if !found.is_empty() {
-        return Err(found);
-    }
-    let axis = Vector3::from(design.layers.axis);
-    let skew = |j: &&Joint| !j.is_compliant() && Vector3::from(j.axis).cross(&axis).norm() > PARALLEL;
-    match design.joints.iter().find(skew) {
-        None => Ok(()),
-        Some(joint) => Err(vec![
-            Diagnostic::error(
-                "E0901",
-                "the printed form of conventional hinges with different axes is not available yet",
-                joint.origin,
-            )
-            .help("without `export stl` the mechanism can be checked, simulated and solved"),
-        ]),
-    }
+/// Bodies and bent flexures in every state.
+pub fn states(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> Vec<MovedState> {
+    let moved = |e: &crate::equilibrium::Equilibrium| {
+        let poses = e.state.poses.clone();
+        let flexures = e.state.rods.iter().enumerate().map(|(r, state)| {
+            let (rod, q) = (&design.rods[r], model.rods[r].rod.parameters());
+            let ends = [poses[rod.from.body].point(&q.position_a), poses[rod.to.body].point(&q.position_b)];
+            flexure_solid(design, layout, model, r, state, ends)
+        });
+        MovedState { flexures: flexures.collect(), poses }
+    };
+    cycle.states.iter().map(moved).collect()
 }
 
 /// Gaps of the planned solids over the cycle, flexures as polygons of the solver's edges (for 20 edges of 1.6 mm
-/// bent to a radius of 15 mm, 0.02 mm inside the arc); empty where there are no solids to measure (the mesh stage
-/// says why): a gap of parts that cannot be made yet would be a guess.
-pub fn gaps(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> CycleGaps {
-    let plans = available(design).ok().and_then(|()| plan_bodies(&parts_input(design, layout, model)).ok());
-    let Some(plans) = plans else {
-        return CycleGaps::default();
+/// bent to a radius of 15 mm, 0.02 mm inside the arc), links as they are after making way for their own flexures; empty
+/// where there are no solids to measure (the mesh stage says why): a gap of parts that cannot be made yet would be a
+/// guess.
+pub fn gaps(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> (CycleGaps, Carving) {
+    let found = available(design).ok().and_then(|()| {
+        let input = parts_input(design, layout, model);
+        let plans = plan_bodies(&input).ok()?;
+        let states = states(design, layout, model, cycle);
+        let carving = carve(&input, &plans, &states).ok()?;
+        let gaps = carved_cycle_gaps(&plans, &states, &carving, input.clearance_mm, |_, _| false);
+        Some((gaps, carving))
+    });
+    found.unwrap_or_default()
+}
+
+/// Links that could not make way for their own flexures, each at the flexure's joint.
+pub fn not_carved(design: &Design, carving: &Carving) -> Vec<Diagnostic> {
+    carving.cuts.iter().filter(|c| !c.made).map(|c| uncarved(design, c)).collect()
+}
+
+fn uncarved(design: &Design, cut: &Cut) -> Diagnostic {
+    let (body, rod) = (&design.bodies[cut.body], &design.rods[cut.flexure]);
+    let process = &design.process;
+    let why = match cut.wall_mm {
+        None => "to take out what it sweeps would cut the link apart".to_string(),
+        Some(wall) => format!(
+            "to take out what it sweeps would leave a wall of {wall:.2} mm, and `{}` needs {:.2} mm",
+            process.name, process.least_wall_mm
+        ),
     };
-    let states: Vec<MovedState> = cycle
-        .states
-        .iter()
-        .map(|e| {
-            let poses = e.state.poses.clone();
-            let flexures = e.state.rods.iter().enumerate().map(|(r, state)| {
-                let (rod, q) = (&design.rods[r], model.rods[r].rod.parameters());
-                let ends =
-                    [poses[rod.from.body].point(&q.position_a), poses[rod.to.body].point(&q.position_b)];
-                flexure_solid(design, layout, model, r, state, ends)
-            });
-            MovedState { flexures: flexures.collect(), poses }
-        })
-        .collect();
-    cycle_gaps(&plans, &states, |_, _| false)
+    let p = cut.at;
+    let message = format!("`{}` cannot be carved to make way for its own flexure `{}`", body.name, rod.path);
+    Diagnostic::warning("W0637", message, design.joints[rod.joint].origin)
+        .label(format!("{why}; they meet near ({:.1}, {:.1}, {:.1}) mm of the rest pose", p.x, p.y, p.z))
+        .also(body.origin, "the link")
+        .help("aim the flexure elsewhere with `into … toward …`, move the link's points, or make the links higher")
 }
 
 /// What meets somewhere in the cycle: each pair once, at its worst state.
