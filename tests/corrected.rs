@@ -96,3 +96,27 @@ fn torque_is_the_slope_of_the_energy() {
     assert!(largest > 1.0 && worst < 1e-3 * largest, "{worst} {largest}");
     assert!((states[0].energy_n_mm - states[steps].energy_n_mm).abs() < 1e-6 * largest);
 }
+
+/// The text chooses, corrected where it says nothing; another theory is another design to the lock.
+#[test]
+fn the_text_chooses_the_theory() {
+    let main = include_str!("../examples/chebyshev/chebyshev.mech");
+    let of = |line: &str| {
+        let text = main.replace("    print on polyjet\n", &format!("    print on polyjet\n{line}\n"));
+        let files = BTreeMap::from([("main.mech".to_string(), text)]);
+        elaborate("main.mech", &files, &Options { steps: Some(2), ..Options::default() }).design.unwrap()
+    };
+    let (silent, corrected, plain) = (of(""), of("model corrected"), of("model plain"));
+    let digest = |d: &Design| flexura::emit::lock::design_digest(d);
+    assert_eq!(digest(&silent), digest(&corrected));
+    assert_ne!(digest(&silent), digest(&plain));
+    let bending = |design: &Design| {
+        let p: Vec<f64> = design.free.iter().map(|f| f.start).collect();
+        let layout = Layout::new(design, &solve_motion(design, &p).unwrap(), &p);
+        let model = Model::new(design, &layout, &p, EDGES, false).unwrap();
+        assert_eq!(model.rods[0].rod.options().corrections, layout.rod_model.corrections());
+        model.rods[0].rod.least_bending_stiffness()
+    };
+    assert!(bending(&silent) > bending(&plain) * 1.005);
+    assert_eq!(bending(&silent), bending(&corrected));
+}

@@ -62,6 +62,7 @@ impl<'a> Evaluator<'a> {
             let process = process.as_ref().map(|(item, _)| *item);
             self.flexures(scope, module, &mut s, process, layers.height_mm, &mut rods);
         }
+        let model = self.rod_model(&sheet);
         let cycle = match sheet.cycle {
             Some(_) => self.cycle(scope, &sheet, outside.steps).ok(),
             None => self.missing(&sheet, m, "cycle", "`cycle 60 steps over 2 s`"),
@@ -105,6 +106,7 @@ impl<'a> Evaluator<'a> {
             bodies: s.bodies,
             joints: s.joints,
             rods,
+            model: model?,
             drives: drives?,
             cycle: cycle?,
             traces,

@@ -27,6 +27,7 @@ mod sheet;
 mod structure;
 mod template;
 mod terms;
+mod theory;
 pub mod units;
 mod value;
 

@@ -1,10 +1,9 @@
 //! The parts of the compliant model that do not depend on the design parameters: rest poses, end
 //! frames of the rods, constraints, drives, traces and their targets, all in rest world coordinates.
 
-use crate::ir::{BodyId, Design};
+use crate::ir::{BodyId, Design, RodModel};
 use crate::kinematics::{Constraint, JointValue, Motion};
 use crate::math::Pose;
-use crate::rod::RodModel;
 use nalgebra::{Matrix3, Vector3};
 
 /// Orthonormal frame of a rod end in rest world coordinates: columns e1, e2, e3.
@@ -68,7 +67,7 @@ pub struct Layout {
     pub rest_poses: Vec<Pose>,
     /// A typical length: lever of rotations in scaled systems, mm.
     pub length_mm: f64,
-    /// Rod theory; the plain one unless set otherwise.
+    /// Rod theory, as the design names it.
     pub rod_model: RodModel,
 }
 
@@ -193,7 +192,7 @@ impl Layout {
             closed,
             rest_poses,
             length_mm,
-            rod_model: RodModel::default(),
+            rod_model: design.model,
         }
     }
 

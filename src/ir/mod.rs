@@ -3,11 +3,13 @@
 
 mod drive;
 pub mod expr;
+mod model;
 mod solution;
 
 pub use crate::diagnostic::Origin;
 pub use drive::{Drive, DriveUnit, Profile};
 use expr::{ExprGraph, ExprId};
+pub use model::RodModel;
 use serde::{Deserialize, Serialize};
 pub use solution::Solution;
 
@@ -33,6 +35,9 @@ pub struct Design {
     pub joints: Vec<Joint>,
     /// Rods of all compliant joints.
     pub rods: Vec<Rod>,
+    /// Theory of the rods.
+    #[serde(default, skip_serializing_if = "RodModel::is_default")]
+    pub model: RodModel,
     /// Drives.
     pub drives: Vec<Drive>,
     /// Steps and duration.

@@ -68,9 +68,10 @@ mod state;
 mod stencil;
 mod stress;
 
+pub use crate::ir::RodModel;
 pub use assemble::RodSystem;
 pub use condense::FactorReport;
-pub use options::{Corrections, RestFrames, RodModel, RodOptions};
+pub use options::{Corrections, RestFrames, RodOptions};
 pub use rest::{MIN_EDGES, PARAMETERS, RodError, RodParameters};
 pub use section::{RodMaterial, SectionShape, Stiffness, ellipse_stiffness, rectangle_stiffness};
 pub use sensitivity::{ParameterMatrix, SensitivityError};

@@ -157,6 +157,8 @@ pub enum StatementKind {
         /// Height.
         height: Expr,
     },
+    /// `model NAME`: theory of the flexures.
+    Model(Ident),
     /// `cycle N steps [over T]`
     Cycle {
         /// Number of steps.

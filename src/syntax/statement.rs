@@ -52,6 +52,7 @@ impl Lower<'_> {
             Kind::MaterialUse => StatementKind::Material(self.ident(node)?),
             Kind::Print => StatementKind::PrintOn(self.ident(node)?),
             Kind::Links => StatementKind::Links { height: self.value(node)? },
+            Kind::Model => StatementKind::Model(self.ident(node)?),
             Kind::Cycle => {
                 let mut values = self.values(node).into_iter();
                 StatementKind::Cycle { steps: values.next()?, over: values.next() }

@@ -20,6 +20,7 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
     "material",
     "print",
     "links",
+    "model",
     "cycle",
     "drive",
     "rest",
@@ -64,7 +65,7 @@ pub(super) fn starts_statement(line: &str) -> bool {
 }
 
 /// How many of [`STATEMENT_WORDS`], which begins with the common ones, help lists.
-pub(super) const COMMON_STATEMENTS: usize = 22;
+pub(super) const COMMON_STATEMENTS: usize = 23;
 
 /// Whether a keyword is a kind of joint.
 pub(super) fn is_joint_kind(word: &str) -> bool {
@@ -89,6 +90,7 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "material" => "material NAME",
         "print" => "print on PROCESS",
         "links" => "links height LENGTH",
+        "model" => "model corrected` or `model plain",
         "cycle" => "cycle NUMBER steps over TIME",
         "drive" => "drive JOINT from VALUE to VALUE with MOTOR",
         "rest" => "rest JOINT at VALUE",
