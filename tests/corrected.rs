@@ -15,10 +15,11 @@ const EDGES: usize = 12;
 /// convergence (1e-9 of the largest force) rises with its inverse.
 const STEP: f64 = 1e-3;
 
-/// Chebyshev's linkage; the upper leaf of each joint a rectangle, the lower one a wire.
+/// Chebyshev's linkage; the upper leaf of each joint a tapered rectangle, the lower one a wire.
 fn design(steps: usize) -> Design {
     let leaves = include_str!("../stdlib/flexures/crossed_leaves.mech");
-    let leaves = leaves.replacen("ellipse(", "rect(", 1);
+    let upper = "rect(thick = thickness, wide = wide) to rect(thick = 0.8 * thickness, wide = wide)";
+    let leaves = leaves.replacen("ellipse(thick = thickness, wide = wide)", upper, 1);
     let leaves = leaves.replacen("ellipse(thick = thickness, wide = wide)", "round(1.5 * thickness)", 1);
     let main = include_str!("../examples/chebyshev/chebyshev.mech");
     let main = main.replace("use std.flexures.crossed_leaves", "use \"leaves.mech\"");

@@ -25,6 +25,7 @@ mod scope;
 mod settings;
 mod sheet;
 mod structure;
+mod taper;
 mod template;
 mod terms;
 mod theory;

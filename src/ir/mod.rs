@@ -206,8 +206,11 @@ pub struct Rod {
     pub from: RodEnd,
     /// End.
     pub to: RodEnd,
-    /// Cross-section.
+    /// Cross-section, of a tapered rod at its start.
     pub section: Section,
+    /// Of a tapered rod the cross-section at its end, of the same shape: half widths run linearly in arc length.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub section_to: Option<Section>,
     /// Declaration in the template.
     pub origin: Origin,
 }

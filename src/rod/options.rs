@@ -56,6 +56,8 @@ pub struct RodOptions {
     pub frames: RestFrames,
     /// Corrections; none by default.
     pub corrections: Corrections,
+    /// Whether the widths run linearly in arc length from those at end A to those at end B.
+    pub taper: bool,
 }
 
 impl RodOptions {

@@ -307,6 +307,8 @@ pub struct Rod {
     pub to: RodEnd,
     /// `section …`
     pub section: Expr,
+    /// `section … to …`
+    pub section_to: Option<Expr>,
 }
 
 /// One end of a rod.

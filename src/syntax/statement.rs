@@ -198,11 +198,13 @@ impl Lower<'_> {
     }
 
     fn rod(&mut self, node: &Node) -> Option<Rod> {
+        let mut section = self.values(node.first(Kind::RodSection)?).into_iter();
         Some(Rod {
             name: self.ident(node)?,
             from: self.rod_end(node.first(Kind::RodFrom)?)?,
             to: self.rod_end(node.first(Kind::RodTo)?)?,
-            section: self.value(node.first(Kind::RodSection)?)?,
+            section: section.next()?,
+            section_to: section.next(),
         })
     }
 
