@@ -26,6 +26,7 @@ impl Builder {
             free: Vec::new(),
             bodies: Vec::new(),
             joints: Vec::new(),
+            model: Default::default(),
             rods: Vec::new(),
             drives: Vec::new(),
             cycle: Cycle { steps: 60, duration_s: 2.0, origin: origin(9, 0) },

@@ -62,6 +62,7 @@ impl<'a> Evaluator<'a> {
             let process = process.as_ref().map(|(item, _)| *item);
             self.flexures(scope, module, &mut s, process, layers.height_mm, &mut rods);
         }
+        let model = self.rod_model(&sheet);
         let cycle = match sheet.cycle {
             Some(_) => self.cycle(scope, &sheet, outside.steps).ok(),
             None => self.missing(&sheet, m, "cycle", "`cycle 60 steps over 2 s`"),
@@ -103,6 +104,7 @@ impl<'a> Evaluator<'a> {
             bodies: s.bodies,
             joints: s.joints,
             rods,
+            model: model?,
             drives: drives?,
             cycle: cycle?,
             traces,
@@ -197,10 +199,11 @@ impl<'a> Evaluator<'a> {
         let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
         let values = design.exprs.values(&start);
         for rod in &design.rods {
-            let [a, b] = rod.section.half_widths();
+            let mut widths =
+                std::iter::once(&rod.section).chain(&rod.section_to).flat_map(|s| s.half_widths());
             let ids = [rod.from.position, rod.from.derivative, rod.to.position, rod.to.derivative];
             let finite = |id: &ExprId| values.get(id.0 as usize).is_some_and(|v| v.is_finite());
-            if !(ids.iter().flatten().all(finite) && finite(&a) && finite(&b)) {
+            if !(ids.iter().flatten().all(finite) && widths.all(|id| finite(&id))) {
                 self.out.push(
                     Diagnostic::error(
                         codes::NOT_FINITE,
@@ -243,12 +246,14 @@ fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
             end.position.iter_mut().for_each(&mut *f);
             end.derivative.iter_mut().for_each(&mut *f);
         }
-        match &mut r.section {
-            Section::Ellipse { a, b } | Section::Rect { a, b } => {
-                f(a);
-                f(b);
+        for section in std::iter::once(&mut r.section).chain(&mut r.section_to) {
+            match section {
+                Section::Ellipse { a, b } | Section::Rect { a, b } => {
+                    f(a);
+                    f(b);
+                }
+                Section::Round { r } => f(r),
             }
-            Section::Round { r } => f(r),
         }
     }
     for t in &mut design.traces {

@@ -27,8 +27,10 @@ mod scope;
 mod settings;
 mod sheet;
 mod structure;
+mod taper;
 mod template;
 mod terms;
+mod theory;
 pub mod units;
 mod value;
 

@@ -48,6 +48,7 @@ pub struct Sheet<'a> {
     pub material: Option<(&'a Ident, Origin)>,
     pub process: Option<(&'a Ident, Origin)>,
     pub height: Option<(&'a Expr, Origin)>,
+    pub model: Option<(&'a Ident, Origin)>,
     pub cycle: Option<(&'a Expr, Option<&'a Expr>, Origin)>,
     pub drives: Vec<DriveText<'a>>,
     pub rests: Vec<(&'a Ident, &'a Expr, Origin)>,
@@ -141,6 +142,12 @@ impl<'a> Evaluator<'a> {
                 let first = sheet.height.map(|m| m.1);
                 if self.once("links height", at, first) {
                     sheet.height = Some((height, at));
+                }
+            }
+            StatementKind::Model(name) => {
+                let first = sheet.model.map(|m| m.1);
+                if self.once("model", at, first) {
+                    sheet.model = Some((name, at));
                 }
             }
             StatementKind::Cycle { steps, over } => {

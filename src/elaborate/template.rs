@@ -315,6 +315,7 @@ impl<'a> Evaluator<'a> {
         let from = self.rod_end(scope, &rod.from, members, &format!("{path}.from"));
         let to = self.rod_end(scope, &rod.to, members, &format!("{path}.to"));
         let section = self.section(scope, &rod.section, &path);
+        let section_to = self.section_to(scope, rod, &path);
         let (from, to) = (from?, to?);
         if from.body == to.body {
             return self.fail(Diagnostic::error(
@@ -330,6 +331,7 @@ impl<'a> Evaluator<'a> {
             to,
             second_axis: second_axis?,
             section: section?,
+            section_to: section_to?,
             origin: at,
         })
     }
@@ -370,7 +372,7 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Sections are written in full widths and stored in semi-axes.
-    fn section(&mut self, scope: usize, e: &'a Expr, path: &str) -> Outcome<Section> {
+    pub(super) fn section(&mut self, scope: usize, e: &'a Expr, path: &str) -> Outcome<Section> {
         let ExprKind::Call { function, arguments } = &e.kind else {
             if matches!(e.kind, ExprKind::Broken) {
                 return Err(Failed);

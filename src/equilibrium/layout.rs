@@ -3,10 +3,9 @@
 
 use super::change::{LayoutChange, layout_changes};
 use super::frames::{RodEndFrame, end_frames};
-use crate::ir::{BodyId, Design};
+use crate::ir::{BodyId, Design, RodModel};
 use crate::kinematics::{Constraint, JointValue, Motion};
 use crate::math::Pose;
-use crate::rod::RodModel;
 use nalgebra::Vector3;
 use std::borrow::Cow;
 
@@ -64,7 +63,7 @@ pub struct Layout {
     pub conventional: Vec<Vec<Pose>>,
     /// A typical length: lever of rotations in scaled systems, mm.
     pub length_mm: f64,
-    /// Rod theory; the plain one unless set otherwise.
+    /// Rod theory, as the design names it.
     pub rod_model: RodModel,
     /// Its derivatives by every free variable that moves it (see [`Design::geometry_variables`]); none where the
     /// conventional motion has none, at a dead point.
@@ -168,7 +167,7 @@ impl Layout {
             joint_points: joint_points.clone(),
             conventional: motion.states.iter().map(|s| relative(&s.poses, rest)).collect(),
             length_mm,
-            rod_model: RodModel::default(),
+            rod_model: design.model,
             changes: None,
         };
         layout.changes = layout_changes(&layout, design, motion, p);

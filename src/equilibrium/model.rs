@@ -2,7 +2,7 @@
 //! derivatives of each rod's parameters by the design parameters.
 
 use super::layout::Layout;
-use crate::ir::{Design, Section};
+use crate::ir::{self, Design, Section};
 use crate::math::Pose;
 use crate::rod::{
     PARAMETERS, RestFrames, Rod, RodError, RodMaterial, RodModel, RodOptions, RodParameters, RodState,
@@ -18,7 +18,7 @@ pub struct ModelRod {
     pub rod: Rod,
     /// Bodies of its two ends.
     pub bodies: [usize; 2],
-    /// Its parameters by the design parameters, 17 × n.
+    /// Its parameters by the design parameters, 19 × n.
     pub dq_dp: DMatrix<f64>,
 }
 
@@ -56,13 +56,13 @@ pub struct State {
 }
 
 /// How a section of the language is modelled: wires carry frames that need no joint axis.
-fn rod_options(section: &Section, model: RodModel) -> RodOptions {
-    let (section, frames) = match section {
+fn rod_options(rod: &ir::Rod, model: RodModel) -> RodOptions {
+    let (section, frames) = match rod.section {
         Section::Ellipse { .. } => (SectionShape::Ellipse, RestFrames::Axis),
         Section::Rect { .. } => (SectionShape::Rectangle, RestFrames::Axis),
         Section::Round { .. } => (SectionShape::Ellipse, RestFrames::Transport),
     };
-    RodOptions { section, frames, corrections: model.corrections() }
+    RodOptions { section, frames, corrections: model.corrections(), taper: rod.section_to.is_some() }
 }
 
 impl<'l> Model<'l> {
@@ -116,13 +116,14 @@ impl<'l> Model<'l> {
                 column.fixed_rows_mut::<3>(12).copy_from(&change.rod_ends[index][0].axes.column(2));
             }
             let [a, b] = rod.section.half_widths();
-            for (row, id) in [(15, a), (16, b)] {
+            let [a_to, b_to] = rod.section_to.as_ref().unwrap_or(&rod.section).half_widths();
+            for (row, id) in [(15, a), (16, b), (17, a_to), (18, b_to)] {
                 q[row] = values.value(id);
                 for (column, g) in values.gradient(id).iter().enumerate() {
                     dq_dp[(row, column)] = *g;
                 }
             }
-            let options = rod_options(&rod.section, layout.rod_model);
+            let options = rod_options(rod, layout.rod_model);
             let q = RodParameters::from_array(&q);
             let built = Rod::with_options(&q, material, edges, options, derivatives)
                 .map_err(|error| ModelError { rod: index, error })?;

@@ -17,9 +17,9 @@ pub struct Sensitivity {
     pub links: DMatrix<f64>,
     /// Multipliers, rows × n.
     pub lambda: DMatrix<f64>,
-    /// Per rod its own 29 directions (12 link increments, 17 parameters) by the n, 29 × n.
+    /// Per rod its own 31 directions (12 link increments, 19 parameters) by the n, 31 × n.
     pub directions: Vec<DMatrix<f64>>,
-    /// Per rod its strain measures with their derivatives by those 29 directions.
+    /// Per rod its strain measures with their derivatives by those 31 directions.
     pub strains: Vec<StrainJacobian>,
     /// Per rod where it is, by the n; empty unless asked for ([`SensitivityWorkspace::with_centrelines`]).
     pub centrelines: Vec<CentrelineJacobian>,

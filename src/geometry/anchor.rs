@@ -154,7 +154,8 @@ impl Followed<'_> {
         };
         let row = if end.at_end { 6 } else { 0 };
         let level = end.axis.transpose() * rod.dq_dp.rows(row, 3);
-        let size = level * by.level + rod.dq_dp.row(15) * by.a + rod.dq_dp.row(16) * by.b;
+        let [a, b] = if end.at_end { [17, 18] } else { [15, 16] };
+        let size = level * by.level + rod.dq_dp.row(a) * by.a + rod.dq_dp.row(b) * by.b;
         RowDVector::from_iterator(self.parameters, size.iter().copied())
     }
 }

@@ -80,8 +80,9 @@ pub fn flexure_solid(
     state: &RodState,
     ends: [Vector3<f64>; 2],
 ) -> FlexureSolid {
-    let (rod, q) = (&design.rods[index], model.rods[index].rod.parameters());
+    let (rod, built) = (&design.rods[index], &model.rods[index].rod);
     let last = state.vertices.len() - 1;
+    let widths: Vec<[f64; 2]> = (0..=last).map(|k| built.station_half_widths_mm(k)).collect();
     // The attachment planes, and the vertices between them.
     let mut centreline = vec![ends[0]];
     centreline.extend_from_slice(&state.vertices[1..last]);
@@ -101,8 +102,8 @@ pub fn flexure_solid(
         joint_point: layout.rod_ends[index][0].origin,
         bodies: (rod.from.body, rod.to.body),
         section: model.rods[index].rod.options().section,
-        a_mm: vec![q.a; centreline.len()],
-        b_mm: vec![q.b; centreline.len()],
+        a_mm: widths.iter().map(|w| w[0]).collect(),
+        b_mm: widths.iter().map(|w| w[1]).collect(),
         m1: frames.iter().map(|f| f[0]).collect(),
         m2: frames.iter().map(|f| f[1]).collect(),
         centreline,

@@ -3,11 +3,13 @@
 
 mod drive;
 pub mod expr;
+mod model;
 mod solution;
 
 pub use crate::diagnostic::Origin;
 pub use drive::{Drive, DriveUnit, Profile};
 use expr::{ExprGraph, ExprId};
+pub use model::RodModel;
 use serde::{Deserialize, Serialize};
 pub use solution::Solution;
 
@@ -33,6 +35,9 @@ pub struct Design {
     pub joints: Vec<Joint>,
     /// Rods of all compliant joints.
     pub rods: Vec<Rod>,
+    /// Theory of the rods.
+    #[serde(default, skip_serializing_if = "RodModel::is_default")]
+    pub model: RodModel,
     /// Drives.
     pub drives: Vec<Drive>,
     /// Steps and duration.
@@ -222,8 +227,11 @@ pub struct Rod {
     /// Its ends' e3 is the second axis of a universal joint.
     #[serde(default, skip_serializing_if = "is_false")]
     pub second_axis: bool,
-    /// Cross-section.
+    /// Cross-section, of a tapered rod at its start.
     pub section: Section,
+    /// Of a tapered rod the cross-section at its end, of the same shape: half widths run linearly in arc length.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub section_to: Option<Section>,
     /// Declaration in the template.
     pub origin: Origin,
 }

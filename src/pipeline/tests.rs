@@ -31,6 +31,7 @@ fn design() -> Design {
         bodies: Vec::new(),
         joints: Vec::new(),
         rods: Vec::new(),
+        model: Default::default(),
         drives: vec![crate::ir::Drive {
             name: "motor".into(),
             joint: hinge,

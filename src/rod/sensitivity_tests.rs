@@ -10,6 +10,11 @@ fn step_of(k: usize) -> f64 {
     if k < 12 { 4e-2 } else { 4e-3 }
 }
 
+/// Parameters that a rod depends on.
+fn live(options: &RodOptions) -> usize {
+    if options.taper { PARAMETERS } else { PARAMETERS - 2 }
+}
+
 fn shifted(q: &RodParameters, k: usize, s: f64) -> RodParameters {
     let mut q = q.to_array();
     q[k] += s;
@@ -29,7 +34,9 @@ fn parameter_columns_of(options: RodOptions) {
     system.condense();
     let condensed = *system.parameter_columns(&sample.rod, &sample.a, &sample.b).unwrap();
     let n = sample.rod.internal_freedoms();
-    let p = -system.internal_sensitivity(&DMatrix::zeros(12, 17), &DMatrix::identity(17, 17)).unwrap();
+    let p = -system
+        .internal_sensitivity(&DMatrix::zeros(12, PARAMETERS), &DMatrix::identity(PARAMETERS, PARAMETERS))
+        .unwrap();
     let q0 = curved();
     let energy = |k: usize, dq: f64, i: usize, d: f64| {
         let rod = Rod::with_options(&shifted(&q0, k, dq), MATERIAL, 8, options, false).unwrap();
@@ -42,8 +49,8 @@ fn parameter_columns_of(options: RodOptions) {
         rod.energy(&state)
     };
     // Mixed second derivatives in the chart of the present state.
-    let mut columns = DMatrix::zeros(n + 12, 17);
-    for k in 0..17 {
+    let mut columns = DMatrix::zeros(n + 12, PARAMETERS);
+    for k in 0..live(&options) {
         let dq = step_of(k) * 0.2;
         let own_q = difference(|s| energy(k, s * dq, 0, 0.0), 1.0).1;
         for i in 0..n + 12 {
@@ -57,9 +64,9 @@ fn parameter_columns_of(options: RodOptions) {
     let (inner, coupling) = (h.view((0, 0), (n, n)), h.view((0, n), (n, 12)));
     let got_internal = inner * &p;
     let want_internal = columns.rows(0, n);
-    let got_link = DMatrix::from_fn(12, 17, |i, j| condensed[(i, j)]) + coupling.transpose() * &p;
+    let got_link = DMatrix::from_fn(12, PARAMETERS, |i, j| condensed[(i, j)]) + coupling.transpose() * &p;
     let want_link = columns.rows(n, 12);
-    for k in 0..17 {
+    for k in 0..live(&options) {
         let scale = columns.column(k).amax();
         let e1 = (got_internal.column(k) - want_internal.column(k)).amax() / scale;
         let e2 = (got_link.column(k) - want_link.column(k)).amax() / scale;
@@ -70,7 +77,7 @@ fn parameter_columns_of(options: RodOptions) {
     let w: Vec<f64> = (0..n).map(|i| (i as f64 * 0.7).sin()).collect();
     let (_, pulled) = system.internal_pull_back(&w).unwrap();
     let want = -p.tr_mul(&DVector::from_vec(w));
-    assert!((0..17).all(|k| (pulled[k] - want[k]).abs() < 1e-9 * want.amax()));
+    assert!((0..live(&options)).all(|k| (pulled[k] - want[k]).abs() < 1e-9 * want.amax()));
 }
 
 fn clamped(q: &RodParameters, options: RodOptions) -> SingleRod {
@@ -120,12 +127,12 @@ fn check(build: impl Fn(&RodParameters) -> SingleRod, free: bool) {
     let (pose_a, pose_b) = (s.pose_a, s.pose_b);
     let h: SMatrix<f64, 12, 12> = *s.system.condensed_hessian();
     let columns = *s.system.parameter_columns(&s.rod, &pose_a, &pose_b).unwrap();
-    let dq = DMatrix::identity(17, 17);
-    let mut d_link = DMatrix::zeros(12, 17);
+    let dq = DMatrix::identity(PARAMETERS, PARAMETERS);
+    let mut d_link = DMatrix::zeros(12, PARAMETERS);
     if free {
         let (_, lh) = LOAD.derivatives(&pose_b);
         let k: SMatrix<f64, 6, 6> = h.fixed_view::<6, 6>(6, 6) + lh;
-        let b: SMatrix<f64, 6, 17> = columns.fixed_rows::<6>(6).into_owned();
+        let b: SMatrix<f64, 6, PARAMETERS> = columns.fixed_rows::<6>(6).into_owned();
         let d = k.lu().solve(&-b).unwrap();
         d_link.rows_mut(6, 6).copy_from(&d);
     }
@@ -135,7 +142,7 @@ fn check(build: impl Fn(&RodParameters) -> SingleRod, free: bool) {
     let edges = s.rod.edges();
     let stations = edges + 1;
     let base = results(&s);
-    for k in 0..17 {
+    for k in 0..PARAMETERS {
         let mut want = Vec::new();
         for j in 2..=edges - 2 {
             for c in 0..3 {

@@ -157,6 +157,8 @@ pub enum StatementKind {
         /// Height.
         height: Expr,
     },
+    /// `model NAME`: theory of the flexures.
+    Model(Ident),
     /// `cycle N steps [over T]`
     Cycle {
         /// Number of steps.
@@ -314,6 +316,8 @@ pub struct Rod {
     pub to: RodEnd,
     /// `section …`
     pub section: Expr,
+    /// `section … to …`
+    pub section_to: Option<Expr>,
 }
 
 /// One end of a rod.

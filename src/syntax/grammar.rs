@@ -227,6 +227,7 @@ fn kind(rule: Rule) -> Kind {
         Rule::st_material => Kind::MaterialUse,
         Rule::st_print => Kind::Print,
         Rule::st_links => Kind::Links,
+        Rule::st_model => Kind::Model,
         Rule::st_cycle => Kind::Cycle,
         Rule::st_drive => Kind::Drive,
         Rule::profile => Kind::Range,

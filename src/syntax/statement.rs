@@ -52,6 +52,7 @@ impl Lower<'_> {
             Kind::MaterialUse => StatementKind::Material(self.ident(node)?),
             Kind::Print => StatementKind::PrintOn(self.ident(node)?),
             Kind::Links => StatementKind::Links { height: self.value(node)? },
+            Kind::Model => StatementKind::Model(self.ident(node)?),
             Kind::Cycle => {
                 let mut values = self.values(node).into_iter();
                 StatementKind::Cycle { steps: values.next()?, over: values.next() }
@@ -201,12 +202,14 @@ impl Lower<'_> {
     }
 
     fn rod(&mut self, node: &Node) -> Option<Rod> {
+        let mut section = self.values(node.first(Kind::RodSection)?).into_iter();
         Some(Rod {
             name: self.ident(node)?,
             second_axis: node.first(Kind::RodAxis).map(|n| self.which_axis(n)),
             from: self.rod_end(node.first(Kind::RodFrom)?)?,
             to: self.rod_end(node.first(Kind::RodTo)?)?,
-            section: self.value(node.first(Kind::RodSection)?)?,
+            section: section.next()?,
+            section_to: section.next(),
         })
     }
 

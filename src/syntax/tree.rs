@@ -61,6 +61,7 @@ pub enum Kind {
     MaterialUse,
     Print,
     Links,
+    Model,
     Cycle,
     Drive,
     Range,
