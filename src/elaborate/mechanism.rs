@@ -10,7 +10,7 @@ use super::terms::Named;
 use super::value::ItemRef;
 use crate::diagnostic::{Diagnostic, Origin, SourceMap};
 use crate::ir::expr::ExprId;
-use crate::ir::{Design, Drive, ExprPoint, Process, Realization, Rod, Section};
+use crate::ir::{Design, Drive, ExprPoint, LoadKind, Process, Realization, Rod, Section};
 use crate::syntax::ast::Mechanism;
 use std::collections::BTreeMap;
 
@@ -66,10 +66,12 @@ impl<'a> Evaluator<'a> {
             Some(_) => self.cycle(scope, &sheet, outside.steps).ok(),
             None => self.missing(&sheet, m, "cycle", "`cycle 60 steps over 2 s`"),
         };
-        if sheet.drives.is_empty() {
-            let _: Option<()> = self.missing(&sheet, m, "drive", "`drive J from 0 deg to 360 deg`");
+        if sheet.drives.is_empty() && sheet.loads.is_empty() {
+            let _: Option<()> = self.missing(&sheet, m, "drive or load", "`drive J from 0 deg to 360 deg`");
         }
         let drives = self.drives(scope, module, &sheet, &s).ok();
+        let weightless = material.as_ref().filter(|m| m.density_g_mm3.is_none()).map(|m| m.name.as_str());
+        let loads = self.loads(scope, &sheet, &s, weightless).ok();
         let mut traces = Vec::new();
         let mut trace_index = BTreeMap::new();
         for text in &sheet.traces {
@@ -93,7 +95,7 @@ impl<'a> Evaluator<'a> {
         for e in &sheet.exports {
             exports.extend(self.export(scope, e, &driven, &sheet.drives));
         }
-        let geometry = geometry_of(&s, &traces);
+        let geometry = geometry_of(&s, &traces, &loads);
         self.check_fixed_geometry(&geometry);
         if self.out.iter().any(Diagnostic::is_error) {
             return None;
@@ -106,6 +108,7 @@ impl<'a> Evaluator<'a> {
             joints: s.joints,
             rods,
             drives: drives?,
+            loads: loads?,
             cycle: cycle?,
             traces,
             objectives,
@@ -253,7 +256,11 @@ fn quote(sources: &SourceMap, at: Origin) -> String {
 }
 
 /// Every point that the conventional mechanism is made of.
-fn geometry_of(s: &Structure<'_>, traces: &[crate::ir::Trace]) -> Vec<(ExprPoint, Origin)> {
+fn geometry_of(
+    s: &Structure<'_>,
+    traces: &[crate::ir::Trace],
+    loads: &Option<Vec<crate::ir::Load>>,
+) -> Vec<(ExprPoint, Origin)> {
     let mut out = Vec::new();
     for j in &s.joints {
         out.push((j.point, j.origin));
@@ -263,6 +270,7 @@ fn geometry_of(s: &Structure<'_>, traces: &[crate::ir::Trace]) -> Vec<(ExprPoint
         out.extend(b.skeleton.iter().map(|p| (p.position, b.origin)));
     }
     out.extend(traces.iter().map(|t| (t.point, t.origin)));
+    out.extend(loads.iter().flatten().filter_map(super::loads::point_of));
     out
 }
 
@@ -290,5 +298,10 @@ fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
     }
     for t in &mut design.traces {
         t.point.iter_mut().for_each(&mut *f);
+    }
+    for load in &mut design.loads {
+        if let LoadKind::Force { point, .. } = &mut load.kind {
+            point.iter_mut().for_each(&mut *f);
+        }
     }
 }

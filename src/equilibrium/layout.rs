@@ -1,6 +1,7 @@
 //! The parts of the compliant model that do not depend on the design parameters: rest poses, end
 //! frames of the rods, constraints, drives, traces and their targets, all in rest world coordinates.
 
+use super::design_load::LayoutLoad;
 use crate::ir::{BodyId, Design};
 use crate::kinematics::{Constraint, JointValue, Motion};
 use crate::math::Pose;
@@ -60,6 +61,8 @@ pub struct Layout {
     pub constraints: Vec<Constraint>,
     /// Drives.
     pub drives: Vec<LayoutDrive>,
+    /// Loads of the design.
+    pub loads: Vec<LayoutLoad>,
     /// Traces.
     pub traces: Vec<LayoutTrace>,
     /// Whether states 0 and N are the same pose.
@@ -182,13 +185,15 @@ impl Layout {
         }
         let length_mm = (arms.0 / f64::from(arms.1.max(1))).max(1.0);
 
-        let closed = design.drives.iter().all(|d| d.is_closed());
+        let loads = LayoutLoad::of(design, motion, |p| values.point(p));
+        let closed = design.is_closed();
         let rest_poses = rest.clone();
         Self {
             bodies,
             rod_ends,
             constraints,
             drives,
+            loads,
             traces,
             closed,
             rest_poses,
@@ -204,7 +209,8 @@ impl Layout {
 
     /// Number of states 0..=N.
     pub fn states(&self) -> usize {
-        self.drives.iter().map(|d| d.values.len()).max().unwrap_or(1)
+        let of_loads = self.loads.iter().map(|l| l.values.len());
+        self.drives.iter().map(|d| d.values.len()).chain(of_loads).max().unwrap_or(1)
     }
 
     /// Number of states that count in sums: a closed cycle's last state is its first.

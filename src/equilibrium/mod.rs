@@ -5,6 +5,7 @@
 //! The rods are condensed one by one onto the links they join, so what is solved here is a small
 //! symmetric saddle-point system of link increments and multipliers.
 
+mod design_load;
 mod layout;
 mod load;
 mod model;
@@ -12,10 +13,13 @@ mod newton;
 mod saddle;
 mod sensitivity;
 mod sweep;
+mod weight;
 
+pub use design_load::{LayoutLoad, LayoutLoadKind};
 pub use layout::{Layout, RodEndFrame};
 pub use load::PointForce;
 pub use model::{Model, ModelError, ModelRod, State};
 pub use newton::{Equilibrium, SolveError, Solver};
 pub use sensitivity::{Sensitivity, SensitivityWorkspace};
 pub use sweep::{Cycle, SweepError, sweep};
+pub use weight::volume_and_center;

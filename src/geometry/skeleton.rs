@@ -44,7 +44,8 @@ pub fn connect(points: &[Vector3<f64>], blocked: impl Fn(&Vector3<f64>, &Vector3
     Net { hub: None, edges: chain }
 }
 
-fn spanning_tree(
+/// Shortest tree through the points, as pairs of indices.
+pub fn spanning_tree(
     points: &[Vector3<f64>],
     cost: &impl Fn(&Vector3<f64>, &Vector3<f64>) -> f64,
 ) -> Vec<(usize, usize)> {

@@ -3,11 +3,13 @@
 
 mod drive;
 pub mod expr;
+mod load;
 mod solution;
 
 pub use crate::diagnostic::Origin;
 pub use drive::{Drive, DriveUnit, Profile};
 use expr::{ExprGraph, ExprId};
+pub use load::{Load, LoadKind};
 use serde::{Deserialize, Serialize};
 pub use solution::Solution;
 
@@ -35,6 +37,9 @@ pub struct Design {
     pub rods: Vec<Rod>,
     /// Drives.
     pub drives: Vec<Drive>,
+    /// Loads from outside.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub loads: Vec<Load>,
     /// Steps and duration.
     pub cycle: Cycle,
     /// Traced points.

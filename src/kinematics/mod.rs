@@ -10,6 +10,7 @@ pub mod mechanism;
 pub mod mobility;
 pub mod motion;
 mod path;
+mod standing;
 pub mod value;
 
 pub use constraint::{Constraint, GeometryChange, Jacobian};

@@ -67,6 +67,7 @@ pub mod single;
 mod state;
 mod stencil;
 mod stress;
+mod weight;
 
 pub use assemble::RodSystem;
 pub use condense::FactorReport;

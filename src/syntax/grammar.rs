@@ -132,6 +132,9 @@ fn words(rule: Rule) -> String {
         Rule::rod_from => "`from`",
         Rule::rod_to => "`to`",
         Rule::rod_section => "`section`",
+        Rule::load_gravity => "`gravity`",
+        Rule::load_moment => "`moment`",
+        Rule::load_force => "a value",
         other => {
             // Keyword rules are called after their keyword.
             let name = format!("{other:?}");
@@ -244,6 +247,10 @@ fn kind(rule: Rule) -> Kind {
         Rule::rod_from => Kind::RodFrom,
         Rule::rod_to => Kind::RodTo,
         Rule::rod_section => Kind::RodSection,
+        Rule::st_load => Kind::Load,
+        Rule::load_gravity => Kind::Gravity,
+        Rule::load_moment => Kind::Moment,
+        Rule::load_force => Kind::Force,
         Rule::st_later => Kind::Later,
         Rule::value => Kind::Value,
         Rule::free => Kind::Free,

@@ -79,6 +79,10 @@ pub enum Kind {
     RodFrom,
     RodTo,
     RodSection,
+    Load,
+    Gravity,
+    Moment,
+    Force,
     Later,
     // items
     File,

@@ -28,6 +28,7 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
     "require",
     "export",
     "rod",
+    "load",
     "allow",
     "assert",
     "body",
@@ -36,7 +37,6 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
     "for",
     "hole",
     "horn",
-    "load",
     "mirror",
     "mount",
     "output",
@@ -64,7 +64,7 @@ pub(super) fn starts_statement(line: &str) -> bool {
 }
 
 /// How many of [`STATEMENT_WORDS`], which begins with the common ones, help lists.
-pub(super) const COMMON_STATEMENTS: usize = 22;
+pub(super) const COMMON_STATEMENTS: usize = 23;
 
 /// Whether a keyword is a kind of joint.
 pub(super) fn is_joint_kind(word: &str) -> bool {
@@ -99,6 +99,7 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "require" => "require VALUE <= VALUE",
         "export" => "export NAME, …",
         "rod" => "rod NAME { from a at … along … to b at … along … section … }",
+        "load" => "load FORCE along DIRECTION on BODY at POINT",
         _ => return None,
     })
 }
