@@ -29,6 +29,7 @@ impl Builder {
             model: Default::default(),
             rods: Vec::new(),
             drives: Vec::new(),
+            loads: Vec::new(),
             cycle: Cycle { steps: 60, duration_s: 2.0, origin: origin(9, 0) },
             traces: Vec::new(),
             objectives: Vec::new(),

@@ -108,7 +108,8 @@ fn artefacts(text: &mut String, written: &[(String, usize)], style: Style) {
 }
 
 fn number(value: Option<f64>) -> String {
-    value.map_or("-".into(), |v| format!("{v:.3}"))
+    // What has no target has no error.
+    value.filter(|v| v.is_finite()).map_or("-".into(), |v| format!("{v:.3}"))
 }
 
 fn size(bytes: usize) -> String {

@@ -68,6 +68,9 @@ codes! {
     NOT_DRIVEN "E0417" "a drive of a joint that has no single value";
     MODEL "E0430" "a theory of flexures that does not exist";
     TAPER "E0431" "a rod between sections of different shape";
+    NONCONSERVATIVE "E0440" "a moment whose work would depend on the way";
+    WEIGHTLESS "E0441" "gravity on a material that states no density";
+    NO_TARGET "E0442" "the error of a trace without a target";
     LATER_STATEMENT "E0901" "a statement that is not available yet";
     LATER_TERM "E0902" "an objective, query, export or function that is not available yet";
     LATER_JOINT "E0903" "a kind of joint that is not available yet";

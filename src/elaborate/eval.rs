@@ -82,6 +82,8 @@ pub struct Evaluator<'a> {
     pub(super) half_said: BTreeSet<String>,
     /// Where each node is: only looked up, never listed.
     interned: HashMap<(u8, u64, u64), ExprId>,
+    /// Nothing is driven: the conventional mechanism has no path.
+    pub(super) undriven: bool,
     /// Names of the joints that slide.
     pub(super) sliders: BTreeSet<String>,
     /// Values of all nodes at the start values of the free variables, and those start values.
@@ -108,6 +110,7 @@ impl<'a> Evaluator<'a> {
             paths: BTreeSet::new(),
             half_said: BTreeSet::new(),
             interned: HashMap::new(),
+            undriven: false,
             sliders: BTreeSet::new(),
             starts: (Vec::new(), Vec::new()),
         }

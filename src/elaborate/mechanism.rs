@@ -10,7 +10,7 @@ use super::terms::Named;
 use super::value::ItemRef;
 use crate::diagnostic::{Diagnostic, Origin, SourceMap};
 use crate::ir::expr::ExprId;
-use crate::ir::{Design, Drive, Process, Realization, Rod, Section};
+use crate::ir::{Design, Drive, LoadKind, Process, Realization, Rod, Section};
 use crate::syntax::ast::Mechanism;
 use std::collections::BTreeMap;
 
@@ -67,10 +67,12 @@ impl<'a> Evaluator<'a> {
             Some(_) => self.cycle(scope, &sheet, outside.steps).ok(),
             None => self.missing(&sheet, m, "cycle", "`cycle 60 steps over 2 s`"),
         };
-        if sheet.drives.is_empty() {
-            let _: Option<()> = self.missing(&sheet, m, "drive", "`drive J from 0 deg to 360 deg`");
+        if sheet.drives.is_empty() && sheet.loads.is_empty() {
+            let _: Option<()> = self.missing(&sheet, m, "drive or load", "`drive J from 0 deg to 360 deg`");
         }
         let drives = self.drives(scope, module, &sheet, &s).ok();
+        let weightless = material.as_ref().filter(|m| m.density_g_mm3.is_none()).map(|m| m.name.as_str());
+        let loads = self.loads(scope, &sheet, &s, weightless).ok();
         let mut traces = Vec::new();
         let mut trace_index = BTreeMap::new();
         for text in &sheet.traces {
@@ -106,6 +108,7 @@ impl<'a> Evaluator<'a> {
             rods,
             model: model?,
             drives: drives?,
+            loads: loads?,
             cycle: cycle?,
             traces,
             objectives,
@@ -260,4 +263,9 @@ fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
         t.point.iter_mut().for_each(&mut *f);
     }
     design.drives.iter_mut().filter_map(|d| d.free_rest.as_mut()).for_each(&mut *f);
+    for load in &mut design.loads {
+        if let LoadKind::Force { point, .. } = &mut load.kind {
+            point.iter_mut().for_each(&mut *f);
+        }
+    }
 }

@@ -15,6 +15,7 @@ mod functions;
 mod goals;
 mod graph;
 mod load;
+mod loads;
 mod lookup;
 mod mechanism;
 mod members;

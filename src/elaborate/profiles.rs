@@ -46,13 +46,19 @@ impl<'a> Evaluator<'a> {
                 let to = self.eval_fixed(scope, to, dimension, "the drive's end");
                 Ok(Profile::Range { from: from?, to: to? })
             }
-            ast::Profile::By(e) => self.expression(scope, e, dimension),
+            ast::Profile::By(e) => self.of_time(scope, e, dimension, ["a drive", "the drive's value"]),
             ast::Profile::Keys { smooth, keys, at } => self.keys(scope, *smooth, keys, *at, unit, dimension),
         }
     }
 
-    /// The expression gets a graph of its own, whose only variable is t.
-    fn expression(&mut self, scope: usize, e: &'a Expr, dimension: Dimension) -> Outcome<Profile> {
+    /// An expression of t, of something (`owner`, `what` of it) that must not depend on a free value. It gets a graph of its own, whose only variable is t.
+    pub(super) fn of_time(
+        &mut self,
+        scope: usize,
+        e: &'a Expr,
+        dimension: Dimension,
+        [owner, what]: [&str; 2],
+    ) -> Outcome<Profile> {
         let declared = self.scopes.get(scope).and_then(|s| s.locals.get(*s.index.get(TIME)?)).map(|l| l.at);
         if let Some(at) = declared {
             return self.fail(
@@ -68,7 +74,7 @@ impl<'a> Evaluator<'a> {
         let t = self.node(Node::Free(time as u32), e.at);
         let value = t.and_then(|t| {
             let env = Env { time: Some(t), ..Env::fixed(scope) };
-            self.eval_scalar(&env, e, dimension, "the drive's value")
+            self.eval_scalar(&env, e, dimension, what)
         });
         self.starts.1.truncate(time);
         let value = value?;
@@ -76,7 +82,7 @@ impl<'a> Evaluator<'a> {
         if let Some(free) = free {
             let d = Diagnostic::error(
                 codes::NOT_FIXED,
-                "a drive must be fixed, this depends on a free value",
+                format!("{owner} must be fixed, this depends on a free value"),
                 e.at,
             );
             return self.fail(match self.free.get(free) {

@@ -124,6 +124,7 @@ impl<'a> Evaluator<'a> {
             "error" => {
                 let slots = self.arguments(name, args, &["trace"], 1)?;
                 let trace = self.trace_argument(scope, slots.first().copied().flatten(), traces)?;
+                self.needs_target(name)?;
                 Ok((Quantity::Error(trace), Dimension::LENGTH))
             }
             "stress" => {

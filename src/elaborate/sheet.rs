@@ -51,6 +51,7 @@ pub struct Sheet<'a> {
     pub model: Option<(&'a Ident, Origin)>,
     pub cycle: Option<(&'a Expr, Option<&'a Expr>, Origin)>,
     pub drives: Vec<DriveText<'a>>,
+    pub loads: Vec<(&'a ast::Load, Origin)>,
     pub rests: Vec<(&'a Ident, &'a Expr, Origin)>,
     pub traces: Vec<TraceText<'a>>,
     pub minimize: Option<(&'a [ast::Term], Origin)>,
@@ -160,6 +161,7 @@ impl<'a> Evaluator<'a> {
                 let (motor, continuous) = (motor.as_ref(), *continuous);
                 sheet.drives.push(DriveText { joint, profile, motor, continuous, at });
             }
+            StatementKind::Load(load) => sheet.loads.push((load, at)),
             StatementKind::Rest { joint, value } => sheet.rests.push((joint, value, at)),
             StatementKind::Trace { name, point, body } => {
                 if self.name_thing(scope, name, "trace") {

@@ -78,6 +78,7 @@ impl<'a> Evaluator<'a> {
     ) -> Outcome<(ObjectiveKind, f64)> {
         let slots = self.arguments(function, arguments, &["trace", "scale"], 1)?;
         let trace = self.trace_argument(scope, slots.first().copied().flatten(), named.traces);
+        self.needs_target(function)?;
         let scale_mm = self.positive(scope, slots.get(1).copied().flatten(), Dimension::LENGTH, "a scale")?;
         let default = if scale_mm.is_some() { 1.0 } else { TRACK_WEIGHT };
         Ok((ObjectiveKind::Track { trace: trace?, scale_mm }, default))

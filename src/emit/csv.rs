@@ -14,6 +14,8 @@ pub struct MotionTable {
     pub bodies: Vec<String>,
     /// Whether the rows carry torque, energy and stress.
     pub has_forces: bool,
+    /// Whether loads act, which have a potential.
+    pub has_loads: bool,
     /// The states in order.
     pub states: Vec<MotionState>,
 }
@@ -29,6 +31,8 @@ pub struct MotionState {
     pub drive_loads: Vec<f64>,
     /// Elastic energy, N·mm.
     pub energy_n_mm: f64,
+    /// Potential of the loads relative to the rest pose, N·mm.
+    pub load_potential_n_mm: f64,
     /// Largest von Mises stress over all rods, MPa.
     pub stress_max_mpa: f64,
     /// Translation t (mm) and rotation vector (rad), a body: x = t + R X with X in the rest pose.
@@ -73,6 +77,9 @@ pub fn columns(table: &MotionTable) -> Vec<String> {
             DriveUnit::Mm => format!("force.{drive}_n"),
         }));
         out.extend(["energy_n_mm", "stress_max_mpa"].map(String::from));
+        if table.has_loads {
+            out.push("load_potential_n_mm".into());
+        }
     }
     for body in &table.bodies {
         let parts = ["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"];
@@ -97,6 +104,9 @@ pub fn values(table: &MotionTable, step: usize) -> Vec<Option<f64>> {
     if table.has_forces {
         row.extend((0..table.drives.len()).map(|i| at(&state.drive_loads, i)));
         row.extend([state.energy_n_mm, state.stress_max_mpa]);
+        if table.has_loads {
+            row.push(state.load_potential_n_mm);
+        }
     }
     for i in 0..table.bodies.len() {
         let (translation, rotation) = state.poses.get(i).copied().unwrap_or(([f64::NAN; 3], [f64::NAN; 3]));
@@ -136,11 +146,13 @@ mod tests {
             traces: vec!["tip".into()],
             bodies: vec!["coupler".into()],
             has_forces: true,
+            has_loads: false,
             states: vec![MotionState {
                 drives: vec![30_f64.to_radians()],
                 traces_mm: vec![[1.5, -0.0, 0.1]],
                 drive_loads: vec![-2.25],
                 energy_n_mm: 3.0,
+                load_potential_n_mm: -5.0,
                 stress_max_mpa: 1e-9,
                 poses: vec![([1.0, 2.0, 3.0], [0.1, 0.2, f64::NAN])],
             }],

@@ -2,6 +2,7 @@
 //! and their targets, all in rest world coordinates; and how it moves with the free variables of the geometry.
 
 use super::change::{LayoutChange, layout_changes};
+use super::design_load::LayoutLoad;
 use super::frames::{RodEndFrame, end_frames};
 use crate::ir::{BodyId, Design, RodModel};
 use crate::kinematics::{Constraint, JointValue, Motion};
@@ -51,6 +52,8 @@ pub struct Layout {
     pub constraints: Vec<Constraint>,
     /// Drives.
     pub drives: Vec<LayoutDrive>,
+    /// Loads of the design.
+    pub loads: Vec<LayoutLoad>,
     /// Traces.
     pub traces: Vec<LayoutTrace>,
     /// Whether states 0 and N are the same pose.
@@ -154,13 +157,15 @@ impl Layout {
         }
         let length_mm = (arms.0 / f64::from(arms.1.max(1))).max(1.0);
 
-        let closed = design.drives.iter().all(|d| d.is_closed());
+        let loads = LayoutLoad::of(design, motion, |p| values.point(p));
+        let closed = design.is_closed();
         let rest_poses = rest.clone();
         let mut layout = Self {
             bodies,
             rod_ends,
             constraints,
             drives,
+            loads,
             traces,
             closed,
             rest_poses,
@@ -181,7 +186,8 @@ impl Layout {
 
     /// Number of states 0..=N.
     pub fn states(&self) -> usize {
-        self.drives.iter().map(|d| d.values.len()).max().unwrap_or(1)
+        let of_loads = self.loads.iter().map(|l| l.values.len());
+        self.drives.iter().map(|d| d.values.len()).chain(of_loads).max().unwrap_or(1)
     }
 
     /// Number of states that count in sums: a closed cycle's last state is its first.

@@ -6,6 +6,7 @@
 //! symmetric saddle-point system of link increments and multipliers.
 
 mod change;
+mod design_load;
 mod frames;
 mod layout;
 mod load;
@@ -14,8 +15,10 @@ mod newton;
 mod saddle;
 mod sensitivity;
 mod sweep;
+mod weight;
 
 pub use change::{DriveChange, EndFrameChange, LayoutChange, TraceChange};
+pub use design_load::{LayoutLoad, LayoutLoadKind};
 pub use frames::RodEndFrame;
 pub use layout::Layout;
 pub use load::{PointForce, PointForceChange};
@@ -23,3 +26,4 @@ pub use model::{Model, ModelError, ModelRod, State};
 pub use newton::{Equilibrium, SolveError, Solver};
 pub use sensitivity::{Sensitivity, SensitivityWorkspace};
 pub use sweep::{Cycle, SweepError, sweep};
+pub use weight::volume_and_center;

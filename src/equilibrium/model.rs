@@ -53,6 +53,8 @@ pub struct State {
     pub lambda: Vec<f64>,
     /// Drive values relative to rest, unwrapped, rad or mm.
     pub drives: Vec<f64>,
+    /// Turn that each load works on, unwrapped, rad; zero for loads that are no moments.
+    pub turns: Vec<f64>,
 }
 
 /// How a section of the language is modelled: wires carry frames that need no joint axis.
@@ -139,6 +141,7 @@ impl<'l> Model<'l> {
             rods: self.rods.iter().map(|r| r.rod.rest_state()).collect(),
             lambda: vec![0.0; self.rows()],
             drives: vec![0.0; self.layout.drives.len()],
+            turns: vec![0.0; self.layout.loads.len()],
         }
     }
 

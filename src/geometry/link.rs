@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 use std::cell::OnceCell;
 
 /// Half width of a bar as a part of the layer's height.
-const BAR_PER_HEIGHT: f64 = 0.35;
+pub const BAR_PER_HEIGHT: f64 = 0.35;
 /// Radius of a boss or plain eye beyond the bar's half width, mm.
 pub(super) const BOSS_EXTRA_MM: f64 = 0.4;
 /// How far the top of a boss stays below its layer's face, mm.

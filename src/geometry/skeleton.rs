@@ -53,7 +53,8 @@ pub fn connect(points: &[Vector3<f64>], blocked: impl Fn(&Vector3<f64>, &Vector3
     Net { hub: None, edges: chain }
 }
 
-fn spanning_tree(count: usize, cost: &impl Fn(usize, usize) -> f64) -> Vec<(usize, usize)> {
+/// Shortest tree through `count` nodes, as pairs of indices.
+pub fn spanning_tree(count: usize, cost: &impl Fn(usize, usize) -> f64) -> Vec<(usize, usize)> {
     let mut edges = Vec::new();
     let mut inside = vec![false; count];
     if let Some(first) = inside.first_mut() {

@@ -3,12 +3,14 @@
 
 mod drive;
 pub mod expr;
+mod load;
 mod model;
 mod solution;
 
 pub use crate::diagnostic::Origin;
 pub use drive::{Drive, DriveUnit, Profile};
 use expr::{ExprGraph, ExprId};
+pub use load::{Load, LoadKind};
 pub use model::RodModel;
 use serde::{Deserialize, Serialize};
 pub use solution::Solution;
@@ -40,6 +42,9 @@ pub struct Design {
     pub model: RodModel,
     /// Drives.
     pub drives: Vec<Drive>,
+    /// Loads from outside.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub loads: Vec<Load>,
     /// Steps and duration.
     pub cycle: Cycle,
     /// Traced points.

@@ -5,7 +5,7 @@ use super::constraint::Constraint;
 use super::idle::{self, Idle};
 use super::value::JointValue;
 use crate::diagnostic::Diagnostic;
-use crate::ir::{Design, Drive, DriveUnit, JointId, JointKind};
+use crate::ir::{Design, Drive, DriveUnit, JointId, JointKind, LoadKind};
 use crate::math::Pose;
 use nalgebra::Vector3;
 
@@ -199,6 +199,10 @@ fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
     let joints = design.joints.iter().all(|j| j.bodies.len() > 1 && j.bodies.iter().all(body));
     let drives = design.drives.iter().all(|d| d.joint < design.joints.len());
     let traces = design.traces.iter().all(|t| body(&t.body));
+    let loads = design.loads.iter().all(|l| match &l.kind {
+        LoadKind::Force { body: b, .. } | LoadKind::Moment { body: b, .. } => body(b),
+        LoadKind::Gravity { .. } => true,
+    });
     let moving = design.bodies.iter().filter(|b| !b.ground && b.owner.is_none()).count();
     let steps = design.cycle.steps;
     let values = if p.len() == design.free.len() { design.exprs.values(p) } else { Vec::new() };
@@ -212,7 +216,7 @@ fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
     };
     let problem = if p.len() != design.free.len() {
         "the number of free values is not the design's"
-    } else if !(joints && drives && traces) {
+    } else if !(joints && drives && traces && loads) {
         "the design refers to bodies or joints it does not have"
     } else if moving == 0 {
         "the mechanism has no link that could move"
@@ -230,6 +234,13 @@ fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
                 drive.origin,
             )
             .help("a drive turns at most 100 times, or slides at most 10 m, in a cycle"),
+        ]);
+    } else if let Some(load) =
+        design.loads.iter().find(|l| (0..=steps).any(|i| !l.size(i as f64 / steps as f64).is_finite()))
+    {
+        return Err(vec![
+            Diagnostic::error("E0500", "a load has no size somewhere in the cycle", load.origin)
+                .help("t runs from 0 to 1: divide by nothing that is zero in between"),
         ]);
     } else if work(design, moving) > MAX_WORK {
         "the drives go too far for so many links"

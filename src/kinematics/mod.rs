@@ -12,6 +12,7 @@ pub mod mechanism;
 pub mod mobility;
 pub mod motion;
 mod path;
+mod standing;
 pub mod value;
 
 pub use carried::{ReferenceChange, Twist};

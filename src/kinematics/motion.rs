@@ -5,6 +5,7 @@ use super::idle::unturn;
 use super::mechanism::Mechanism;
 use super::mobility::{Mobility, names};
 use super::path::{Branch, Sample, Stuck};
+use super::standing;
 use crate::diagnostic::Diagnostic;
 use crate::ir::{BodyId, Design, DriveUnit, JointId, JointKind};
 use crate::math::Pose;
@@ -103,6 +104,9 @@ impl Motion {
 pub fn solve_motion(design: &Design, p: &[f64]) -> Result<Motion, Vec<Diagnostic>> {
     let mechanism = Mechanism::new(design, p)?;
     let mobility = Mobility::of(&mechanism);
+    if !design.is_driven() && !design.loads.is_empty() {
+        return standing(&mechanism, mobility);
+    }
     if let Some(found) = mobility.diagnose(&mechanism) {
         return Err(vec![found]);
     }
@@ -144,6 +148,17 @@ pub fn solve_motion(design: &Design, p: &[f64]) -> Result<Motion, Vec<Diagnostic
     };
     let turning = full_turns(design, &motion, closed);
     if turning.is_empty() { Ok(motion) } else { Err(turning) }
+}
+
+/// Without a drive every state is the drawing.
+fn standing(mechanism: &Mechanism, mobility: Mobility) -> Result<Motion, Vec<Diagnostic>> {
+    if let Some(found) = standing::diagnose(mechanism) {
+        return Err(vec![found]);
+    }
+    let rest = standing::drawn(mechanism);
+    let states = vec![rest.clone(); mechanism.design.cycle.steps + 1];
+    let warnings = mobility.advice(mechanism).into_iter().collect();
+    Ok(Motion { mobility, joint_points: mechanism.joint_points.clone(), rest, states, warnings })
 }
 
 fn state(mechanism: &Mechanism, mut sample: Sample) -> State {

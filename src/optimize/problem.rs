@@ -61,9 +61,13 @@ impl Trial<'_> {
         self.cycle.states.iter().map(|s| s.max_stress_mpa(&self.model)).fold(0.0, f64::max)
     }
 
-    /// Largest distance of any trace from its target, mm; none without a trace.
+    /// Largest distance of any trace from its target, mm; none without a trace or a target.
     pub fn max_error_mm(&self) -> Option<f64> {
         let layout = &self.model.layout;
+        if layout.drives.is_empty() {
+            // What stands still is no target.
+            return None;
+        }
         let mut largest = None;
         for trace in &layout.traces {
             for (state, target) in self.cycle.states.iter().zip(&trace.target) {
@@ -339,7 +343,7 @@ impl<'d> Problem<'d> {
     }
 }
 
-/// Drive values of a state relative to rest, rad or mm.
+/// Drive values of a state relative to rest, rad or mm, and the sizes of its loads.
 fn target(model: &Model, state: usize) -> Vec<f64> {
-    model.layout.drives.iter().map(|d| d.values[state] - d.rest).collect()
+    model.layout.controls(state)
 }

@@ -80,6 +80,7 @@ impl Stages for Compiler {
             traces_mm: layout.traces.iter().map(|t| e.state.poses[t.body].point(&t.rest).into()).collect(),
             drive_loads: (0..layout.drives.len()).map(|d| e.drive_load(&model, d)).collect(),
             energy_n_mm: e.energy_n_mm,
+            load_potential_n_mm: e.load_potential_n_mm,
             stress_max_mpa: e.max_stress_mpa(&model),
             poses: moving(design, |b| from_rest(&e.state.poses[b])),
         });
@@ -90,7 +91,9 @@ impl Stages for Compiler {
                 let distance = |(e, target): (&crate::equilibrium::Equilibrium, &Vector3<f64>)| {
                     (e.state.poses[t.body].point(&t.rest) - target).norm()
                 };
-                cycle.states.iter().zip(&t.target).map(distance).collect()
+                // Without a drive the conventional mechanism stands still: that is no target.
+                let states = if design.is_driven() { cycle.states.as_slice() } else { &[] };
+                states.iter().zip(&t.target).map(distance).collect()
             })
             .collect();
         let mut diagnostics = judge(design, &layout, &cycle);
@@ -210,6 +213,7 @@ fn table(design: &Design, has_forces: bool, states: Vec<MotionState>) -> MotionT
         traces: design.traces.iter().map(|t| t.name.clone()).collect(),
         bodies: design.bodies.iter().filter(|b| !b.ground).map(|b| b.name.clone()).collect(),
         has_forces,
+        has_loads: !design.loads.is_empty(),
         states,
     }
 }
@@ -249,8 +253,15 @@ fn lost(design: &Design, error: &SweepError) -> Failed {
         .zip(&error.last_drives)
         .map(|(d, v)| format!("{} = {}", d.name, d.unit.show(*v)))
         .collect();
-    let at = design.drives.first().map_or(design.origin, |d| d.origin);
     let message = format!("the mechanism cannot be followed to state {}", error.state);
+    if let ([], Some(load)) = (design.drives.as_slice(), design.loads.first()) {
+        return vec![
+            Diagnostic::error("E0602", message, load.origin)
+                .label("no equilibrium under this load")
+                .help("the flexures bear less than that: thicken them, or make the load smaller"),
+        ];
+    }
+    let at = design.drives.first().map_or(design.origin, |d| d.origin);
     vec![
         Diagnostic::error("E0602", message, at)
             .label(format!("last equilibrium at {}", values.join(", ")))

@@ -38,9 +38,9 @@ pub fn measure(design: &Design, simulation: &Simulation) -> Measures {
     measures
 }
 
-/// Whether every drive is in the same pose at both ends of the cycle.
+/// Whether the mechanism is in the same pose at both ends of the cycle.
 pub fn is_closed(design: &Design) -> bool {
-    design.drives.iter().all(|d| d.is_closed())
+    design.is_closed()
 }
 
 /// Checks every `require` line; one that fails is also a diagnostic at its line.

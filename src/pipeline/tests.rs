@@ -48,6 +48,7 @@ fn design() -> Design {
             continuous: true,
             origin,
         }],
+        loads: Vec::new(),
         cycle: Cycle { steps: 4, duration_s: 2.0, origin },
         traces: vec![Trace { name: "tip".into(), body: 0, point: [zero; 3], origin }],
         objectives: vec![Objective {

@@ -68,6 +68,7 @@ pub mod single;
 mod state;
 mod stencil;
 mod stress;
+mod weight;
 
 pub use crate::ir::RodModel;
 pub use assemble::RodSystem;

@@ -206,6 +206,8 @@ pub enum StatementKind {
     },
     /// `export A, B(c)`
     Export(Vec<Expr>),
+    /// `load …`
+    Load(Box<Load>),
     /// `rod NAME { [axis second] from a at … along … to b at … along … section … }` (templates only)
     Rod(Box<Rod>),
     /// `body NAME`: a body that a template brings along (templates only)
@@ -224,6 +226,36 @@ pub enum StatementKind {
     Broken {
         /// The words in it: names that it may have declared.
         words: Vec<String>,
+    },
+}
+
+/// A load on the mechanism.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Load {
+    /// `load gravity DIRECTION`
+    Gravity {
+        /// Where down is.
+        direction: Expr,
+    },
+    /// `load moment SIZE about D on BODY`
+    Moment {
+        /// Size, may depend on t.
+        size: Expr,
+        /// Its axis.
+        about: Expr,
+        /// The body it turns.
+        body: Ident,
+    },
+    /// `load SIZE along D on BODY at P`
+    Force {
+        /// Size, may depend on t.
+        size: Expr,
+        /// Its direction.
+        along: Expr,
+        /// The body it acts on.
+        body: Ident,
+        /// Where.
+        point: Expr,
     },
 }
 

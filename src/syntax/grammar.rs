@@ -133,6 +133,9 @@ fn words(rule: Rule) -> String {
         Rule::rod_to => "`to`",
         Rule::rod_section => "`section`",
         Rule::rod_axis => "`axis`",
+        Rule::load_gravity => "`gravity`",
+        Rule::load_moment => "`moment`",
+        Rule::load_force => "a value",
         other => {
             // Keyword rules are called after their keyword.
             let name = format!("{other:?}");
@@ -248,6 +251,10 @@ fn kind(rule: Rule) -> Kind {
         Rule::rod_section => Kind::RodSection,
         Rule::rod_axis => Kind::RodAxis,
         Rule::st_own => Kind::OwnBody,
+        Rule::st_load => Kind::Load,
+        Rule::load_gravity => Kind::Gravity,
+        Rule::load_moment => Kind::Moment,
+        Rule::load_force => Kind::Force,
         Rule::st_later => Kind::Later,
         Rule::value => Kind::Value,
         Rule::free => Kind::Free,

@@ -1,7 +1,7 @@
 //! Statements: concrete tree to [`ast::StatementKind`].
 
 use super::ast::{
-    At, Compare, Expr, Ident, Joint, Profile, Rod, RodEnd, Statement, StatementKind, TemplateUse, Term,
+    At, Compare, Expr, Ident, Joint, Load, Profile, Rod, RodEnd, Statement, StatementKind, TemplateUse, Term,
 };
 use super::lower::Lower;
 use super::tree::{Kind, Node};
@@ -74,6 +74,7 @@ impl Lower<'_> {
                 name: self.ident(node)?,
                 points: node.first(Kind::Points).map(|n| self.idents(n)).unwrap_or_default(),
             },
+            Kind::Load => StatementKind::Load(Box::new(self.load(node)?)),
             Kind::Later => StatementKind::Later { keyword: self.named(node.first(Kind::Keyword)?) },
             _ => return None,
         })
@@ -199,6 +200,20 @@ impl Lower<'_> {
         };
         let op = At { node: op, at: self.origin(sign) };
         Some(StatementKind::Require { left: values.next()?, op, right: values.next()? })
+    }
+
+    fn load(&mut self, node: &Node) -> Option<Load> {
+        let form = node.parts().find(|n| matches!(n.kind, Kind::Gravity | Kind::Moment | Kind::Force))?;
+        let mut values = self.values(form).into_iter();
+        let first = values.next()?;
+        Some(match form.kind {
+            Kind::Gravity => Load::Gravity { direction: first },
+            Kind::Moment => Load::Moment { size: first, about: values.next()?, body: self.ident(form)? },
+            _ => {
+                let (along, point) = (values.next()?, values.next()?);
+                Load::Force { size: first, along, body: self.ident(form)?, point }
+            }
+        })
     }
 
     fn rod(&mut self, node: &Node) -> Option<Rod> {

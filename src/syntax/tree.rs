@@ -82,6 +82,10 @@ pub enum Kind {
     RodSection,
     RodAxis,
     OwnBody,
+    Load,
+    Gravity,
+    Moment,
+    Force,
     Later,
     // items
     File,

@@ -30,6 +30,7 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
     "export",
     "rod",
     "body",
+    "load",
     "allow",
     "assert",
     "case",
@@ -37,7 +38,6 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
     "for",
     "hole",
     "horn",
-    "load",
     "mirror",
     "mount",
     "output",
@@ -102,6 +102,7 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "export" => "export NAME, …",
         "body" => "body NAME",
         "rod" => "rod NAME { from a at … along … to b at … along … section … }",
+        "load" => "load FORCE along DIRECTION on BODY at POINT",
         _ => return None,
     })
 }
