@@ -319,6 +319,17 @@ impl<'a> Evaluator<'a> {
     }
 
     fn direction(&mut self, scope: usize, e: &'a Expr) -> Outcome<[f64; 3]> {
+        self.unit_direction(scope, e, "an axis", "write `axis z` or `axis (0, 1, 0.25)`")
+    }
+
+    /// A fixed direction of length one; `what` names what it is for ("an axis").
+    pub(super) fn unit_direction(
+        &mut self,
+        scope: usize,
+        e: &'a Expr,
+        what: &str,
+        help: &str,
+    ) -> Outcome<[f64; 3]> {
         if let Some(axis) = named_axis(e) {
             return Ok(axis);
         }
@@ -328,22 +339,22 @@ impl<'a> Evaluator<'a> {
                 return self.fail(
                     Diagnostic::error(
                         codes::TYPE,
-                        format!("an axis is a direction, this is {}", other.a()),
+                        format!("{what} is a direction, this is {}", other.a()),
                         e.at,
                     )
-                    .help("write `axis z` or `axis (0, 1, 0.25)`"),
+                    .help(help),
                 );
             }
         };
         let mut d = [0.0; 3];
         for (slot, id) in d.iter_mut().zip(v) {
-            *slot = self.fixed(id, e.at, "an axis")?;
+            *slot = self.fixed(id, e.at, what)?;
         }
         let length = norm(d);
         if length < 1e-12 {
             return self.fail(Diagnostic::error(
                 codes::AXIS,
-                "an axis of length zero has no direction",
+                format!("{what} of length zero has no direction"),
                 e.at,
             ));
         }

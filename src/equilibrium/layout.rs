@@ -1,6 +1,7 @@
 //! The parts of the compliant model that do not depend on the design parameters: rest poses, end
 //! frames of the rods, constraints, drives, traces and their targets, all in rest world coordinates.
 
+use super::target::{LayoutDirection, LayoutTrace};
 use crate::ir::{BodyId, Design};
 use crate::kinematics::{Constraint, JointValue, Motion};
 use crate::math::Pose;
@@ -38,17 +39,6 @@ pub struct LayoutDrive {
     pub values: Vec<f64>,
 }
 
-/// A traced point.
-#[derive(Clone, Debug)]
-pub struct LayoutTrace {
-    /// Body that carries it.
-    pub body: BodyId,
-    /// Position in the rest pose, mm.
-    pub rest: Vector3<f64>,
-    /// Target per state 0..=N: the conventional mechanism's own path, mm.
-    pub target: Vec<Vector3<f64>>,
-}
-
 /// See the module.
 #[derive(Clone, Debug)]
 pub struct Layout {
@@ -62,6 +52,8 @@ pub struct Layout {
     pub drives: Vec<LayoutDrive>,
     /// Traces.
     pub traces: Vec<LayoutTrace>,
+    /// Traced directions.
+    pub directions: Vec<LayoutDirection>,
     /// Whether states 0 and N are the same pose.
     pub closed: bool,
     /// Rest pose of each body relative to the drawing pose.
@@ -132,16 +124,16 @@ impl Layout {
             })
             .collect();
 
+        let closed = design.drives.iter().all(|d| d.is_closed());
         let traces = design
             .traces
             .iter()
             .enumerate()
-            .map(|(i, t)| LayoutTrace {
-                body: t.body,
-                rest: at_rest(t.body, &values.point(t.point)),
-                target: motion.states.iter().map(|s| s.traces_mm[i]).collect(),
+            .map(|(i, t)| {
+                LayoutTrace::new(design, motion, i, at_rest(t.body, &values.point(t.point)), closed)
             })
             .collect();
+        let directions = LayoutDirection::all(design, motion);
 
         let rod_ends = design
             .rods
@@ -182,7 +174,6 @@ impl Layout {
         }
         let length_mm = (arms.0 / f64::from(arms.1.max(1))).max(1.0);
 
-        let closed = design.drives.iter().all(|d| d.is_closed());
         let rest_poses = rest.clone();
         Self {
             bodies,
@@ -190,6 +181,7 @@ impl Layout {
             constraints,
             drives,
             traces,
+            directions,
             closed,
             rest_poses,
             length_mm,

@@ -12,6 +12,7 @@ mod newton;
 mod saddle;
 mod sensitivity;
 mod sweep;
+mod target;
 
 pub use layout::{Layout, RodEndFrame};
 pub use load::PointForce;
@@ -19,3 +20,4 @@ pub use model::{Model, ModelError, ModelRod, State};
 pub use newton::{Equilibrium, SolveError, Solver};
 pub use sensitivity::{Sensitivity, SensitivityWorkspace};
 pub use sweep::{Cycle, SweepError, sweep};
+pub use target::{LayoutDirection, LayoutTrace, angle_between};

@@ -29,6 +29,8 @@ pub struct State {
     pub joint_values: Vec<f64>,
     /// Position of every trace, mm.
     pub traces_mm: Vec<Vector3<f64>>,
+    /// How far every body whose angle is asked for has turned from the drawing pose, unwrapped, rad.
+    pub angles_rad: Vec<f64>,
 }
 
 /// Solved motion.
@@ -141,8 +143,10 @@ pub fn solve_motion(design: &Design, p: &[f64]) -> Result<Motion, Vec<Diagnostic
     if turning.is_empty() { Ok(motion) } else { Err(turning) }
 }
 
-fn state(mechanism: &Mechanism, sample: Sample) -> State {
+fn state(mechanism: &Mechanism, mut sample: Sample) -> State {
+    let angles_rad = sample.values.split_off(mechanism.values.len());
     State {
+        angles_rad,
         traces_mm: mechanism.trace_points(&sample.poses),
         drives: sample.drive,
         poses: sample.poses,

@@ -1,6 +1,7 @@
 //! The real stages: the only place where the pipeline touches elaboration, kinematics, equilibrium,
 //! optimisation and geometry.
 
+use super::aims::{self, AimSeries};
 use super::progress::Iteration;
 use super::report::Artefact;
 use super::solids;
@@ -64,8 +65,10 @@ impl Stages for Compiler {
                 ..MotionState::default()
             })
             .collect();
+        let aims = AimSeries::conventional(design, &motion);
         Ok(Simulation {
-            motion: table(design, false, states),
+            motion: MotionTable { more: aims.columns(design), ..table(design, false, states) },
+            aims,
             diagnostics: motion.warnings,
             ..Simulation::default()
         })
@@ -97,8 +100,9 @@ impl Stages for Compiler {
         let gaps = solids::gaps(design, &layout, &motion, &model, &cycle);
         diagnostics.extend(solids::collisions(design, &gaps));
         let gaps_mm = gaps.least.iter().filter_map(|g| g.map(|g| g.gap_mm)).collect();
-        let motion = table(design, true, states.collect());
-        Ok(Simulation { motion, errors_mm, gaps_mm, diagnostics })
+        let aims = AimSeries::compliant(design, &layout, &motion, &cycle);
+        let motion = MotionTable { more: aims.columns(design), ..table(design, true, states.collect()) };
+        Ok(Simulation { motion, errors_mm, aims, gaps_mm, diagnostics })
     }
 
     fn optimize(
@@ -108,7 +112,11 @@ impl Stages for Compiler {
         on_iteration: &dyn Fn(&Iteration),
         cancel: &AtomicBool,
     ) -> Result<Solved, Failed> {
-        let (layout, _) = layout(design, start)?;
+        let (layout, motion) = layout(design, start)?;
+        let idle = aims::forces_on_idle(design, &layout, &motion);
+        if !idle.is_empty() {
+            return Err(idle);
+        }
         let problem = Problem::new(design, &layout, EDGES);
         let names = problem.term_names();
         let told = |i: &optimize::Iteration| {
@@ -125,7 +133,10 @@ impl Stages for Compiler {
             // Say why, by simulating the start once more.
             self.simulate(design, start)?;
             let message = "the optimiser has nowhere to begin: an objective cannot be computed at the start";
-            let loaded = design.objectives.iter().find(|o| matches!(o.kind, ObjectiveKind::Sway { .. }));
+            let loaded = design
+                .objectives
+                .iter()
+                .find(|o| matches!(o.kind, ObjectiveKind::Sway { .. } | ObjectiveKind::SwayAlong { .. }));
             let at = loaded.map_or(design.origin, |o| o.origin);
             return Err(vec![
                 Diagnostic::error("E0611", message, at)
@@ -185,6 +196,7 @@ fn table(design: &Design, has_forces: bool, states: Vec<MotionState>) -> MotionT
         bodies: design.bodies.iter().filter(|b| !b.ground).map(|b| b.name.clone()).collect(),
         has_forces,
         states,
+        ..MotionTable::default()
     }
 }
 

@@ -5,7 +5,7 @@
 //! binormal, for planar mechanisms the hinge axis as binormal.
 
 use super::{Objective, StateView, StatesSensitivity, point_rows};
-use crate::equilibrium::{Layout, PointForce};
+use crate::equilibrium::{Layout, LayoutTrace, PointForce};
 use crate::ir::Design;
 use crate::optimize::Normal;
 use nalgebra::Vector3;
@@ -89,20 +89,17 @@ impl Objective for Sway {
 pub fn load_cases(design: &Design, layout: &Layout, trace: usize, force_n: f64) -> [Vec<PointForce>; 2] {
     let axis = Vector3::from(design.layers.axis);
     let planar = design.joints.iter().all(|j| Vector3::from(j.axis).cross(&axis).norm() < PARALLEL);
-    let LayoutTraceParts { body, rest, target } = parts(layout, trace);
-    let normals = path_normals(target, layout.closed, planar.then_some(axis));
+    let LayoutTrace { body, rest, path, .. } = &layout.traces[trace];
+    let (body, rest) = (*body, *rest);
+    let normals = path_normals(path, layout.closed, planar.then_some(axis));
     [0, 1].map(|k| normals.iter().map(|n| PointForce { body, rest, force_n: n[k] * force_n }).collect())
 }
 
-struct LayoutTraceParts<'l> {
-    body: usize,
-    rest: Vector3<f64>,
-    target: &'l [Vector3<f64>],
-}
-
-fn parts(layout: &Layout, trace: usize) -> LayoutTraceParts<'_> {
-    let t = &layout.traces[trace];
-    LayoutTraceParts { body: t.body, rest: t.rest, target: &t.target }
+/// The one load case of a stated direction.
+pub fn load_along(layout: &Layout, trace: usize, force_n: f64, along: [f64; 3]) -> Vec<PointForce> {
+    let LayoutTrace { body, rest, .. } = &layout.traces[trace];
+    let force_n = Vector3::from(along) * force_n;
+    vec![PointForce { body: *body, rest: *rest, force_n }; layout.states()]
 }
 
 /// Normal and binormal of a path at each of its points. Where the path stops or turns back the line of the
