@@ -1,17 +1,13 @@
 //! Series over the cycle beside traces and loads: nearest distances, traced directions, angles of bodies.
 
 use super::measure::aggregate;
-use crate::diagnostic::Diagnostic;
 use crate::equilibrium::{Cycle, Equilibrium, Layout, LayoutTrace, angle_between};
-use crate::ir::{Aggregate, Design, ObjectiveKind};
+use crate::ir::{Aggregate, Design};
 use crate::kinematics::Motion;
 use crate::math::{nearest_turn, twist_about};
 use nalgebra::Vector3;
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// Points this near to the line of a body's joints, in lengths of the layout, lie on it.
-const ON_LINE: f64 = 1e-9;
 
 /// One value a state in every list.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -113,36 +109,6 @@ impl AimSeries {
         let named = design.aims.angles.iter().zip(&self.angles_rad);
         named.filter_map(|(a, series)| Some((a.name.clone()?, one(series)))).collect()
     }
-}
-
-/// Forces of `sway` that would turn a body about the line of its joints, where nothing holds it: one error each.
-pub(super) fn forces_on_idle(design: &Design, layout: &Layout, motion: &Motion) -> Vec<Diagnostic> {
-    let mut found = Vec::new();
-    for objective in &design.objectives {
-        let (ObjectiveKind::Sway { trace, .. } | ObjectiveKind::SwayAlong { trace, .. }) = objective.kind
-        else {
-            continue;
-        };
-        let t = &layout.traces[trace];
-        let arm = t.rest - layout.bodies[t.body].center;
-        let turned = |idle: &&crate::kinematics::Idle| {
-            let axis = motion.rest_direction(idle.body, &idle.axis);
-            idle.is_conventional(design)
-                && idle.bodies.contains(&t.body)
-                && arm.cross(&axis).norm() > ON_LINE * layout.length_mm
-        };
-        if motion.mobility.idle.iter().any(|i| turned(&i)) {
-            let body = &design.bodies[t.body];
-            let message = format!("a force at `{}` would spin `{}`", design.traces[trace].name, body.name);
-            found.push(
-                Diagnostic::error("E0612", message, objective.origin)
-                    .label("nothing holds it against turning about the line of its joints")
-                    .also(body.origin, "this body")
-                    .help("trace a point on the line of its joints, or a point of a body that is held"),
-            );
-        }
-    }
-    found
 }
 
 /// A traced direction against its target.

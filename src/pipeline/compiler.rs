@@ -1,7 +1,7 @@
 //! The real stages: the only place where the pipeline touches elaboration, kinematics, equilibrium,
 //! optimisation and geometry.
 
-use super::aims::{self, AimSeries};
+use super::aims::AimSeries;
 use super::progress::Iteration;
 use super::report::Artefact;
 use super::solids;
@@ -112,11 +112,7 @@ impl Stages for Compiler {
         on_iteration: &dyn Fn(&Iteration),
         cancel: &AtomicBool,
     ) -> Result<Solved, Failed> {
-        let (layout, motion) = layout(design, start)?;
-        let idle = aims::forces_on_idle(design, &layout, &motion);
-        if !idle.is_empty() {
-            return Err(idle);
-        }
+        let (layout, _) = layout(design, start)?;
         let problem = Problem::new(design, &layout, EDGES);
         let names = problem.term_names();
         let told = |i: &optimize::Iteration| {
