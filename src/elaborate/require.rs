@@ -179,7 +179,7 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Reports a driven joint that turns where one that slides is meant, or the other way round.
-    fn slides(&mut self, drive: &Ident, wanted: bool) -> Outcome<()> {
+    pub(super) fn slides(&mut self, drive: &Ident, wanted: bool) -> Outcome<()> {
         let name = &drive.node;
         if self.sliders.contains(name) == wanted {
             return Ok(());

@@ -133,6 +133,7 @@ impl<'a> Evaluator<'a> {
         let scale = slots.get(1).copied().flatten();
         let scale = self.positive(scope, scale, Dimension::TORQUE, "a scale")?;
         let drive = drive?;
+        self.slides(name, false)?;
         if self.form(function, slots.get(2).copied().flatten(), &["paper"])?.is_some() {
             let default = if scale.is_some() { 1.0 } else { TORQUE_WEIGHT };
             let reference_n_mm = scale.unwrap_or(NEWTON_METRE_N_MM);

@@ -1,7 +1,7 @@
 //! What the motion is compared with or asked for beside traced points: directions, targets, angles of bodies.
 
 use super::expr::{ExprGraph, ExprId};
-use super::{BodyId, Design, ObjectiveKind, Origin};
+use super::{BodyId, Design, ObjectiveKind, Origin, Quantity};
 use serde::{Deserialize, Serialize};
 
 /// Directions, targets and angles of a design.
@@ -40,6 +40,12 @@ impl Design {
         };
         let mut found = self.objectives.iter().filter_map(|o| by_form(&o.kind)).peekable();
         found.peek().is_some() && found.all(|closest| closest)
+    }
+
+    /// Whether anything asks for a trace's distance from the nearest place of its target.
+    pub fn asks_for_nearest(&self, trace: usize) -> bool {
+        let asked = Quantity::ErrorClosest(trace);
+        self.has_no_phase(trace) || self.requirements.iter().any(|r| r.quantity == asked)
     }
 }
 
@@ -106,7 +112,7 @@ impl TargetPath {
                 value.map(|id| values.get(id.0 as usize).copied().unwrap_or(f64::NAN))
             }
             Self::Places { times, places } => {
-                let after = times.iter().position(|x| *x >= t).unwrap_or(times.len().saturating_sub(1));
+                let after = times.partition_point(|x| *x < t).min(times.len().saturating_sub(1));
                 let before = after.saturating_sub(1);
                 let (Some(a), Some(b), Some(t0), Some(t1)) =
                     (places.get(before), places.get(after), times.get(before), times.get(after))

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 /// One value a state in every list.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AimSeries {
-    /// Distance of each trace from the nearest place of its target, mm; empty for a conventional motion.
+    /// Distance of each trace from the nearest place of its target, mm; empty where nothing asks for it.
     pub closest_mm: Vec<Vec<f64>>,
     /// Angle of each traced direction from its target, rad; empty for a conventional motion.
     pub aim_errors_rad: Vec<Vec<f64>>,
@@ -39,14 +39,18 @@ impl AimSeries {
 
     /// Of the compliant mechanism. Its angles are those within half a turn of the conventional ones.
     pub fn compliant(design: &Design, layout: &Layout, motion: &Motion, cycle: &Cycle) -> Self {
-        let closest = |t: &LayoutTrace| {
+        let closest = |(i, t): (usize, &LayoutTrace)| {
+            if !design.asks_for_nearest(i) {
+                return Vec::new();
+            }
             let distance = |e: &Equilibrium| {
                 let z = e.state.poses[t.body].point(&t.rest);
                 (z - t.nearest(&z).place).norm()
             };
             cycle.states.iter().map(distance).collect()
         };
-        let mut out = Self { closest_mm: layout.traces.iter().map(closest).collect(), ..Self::default() };
+        let mut out =
+            Self { closest_mm: layout.traces.iter().enumerate().map(closest).collect(), ..Self::default() };
         for d in &layout.directions {
             let present: Vec<Vector3<f64>> =
                 cycle.states.iter().map(|e| e.state.poses[d.body].direction(&d.rest)).collect();
