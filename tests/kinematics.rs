@@ -32,6 +32,7 @@ impl Builder {
             loads: Vec::new(),
             cycle: Cycle { steps: 60, duration_s: 2.0, origin: origin(9, 0) },
             traces: Vec::new(),
+            aims: Default::default(),
             objectives: Vec::new(),
             requirements: Vec::new(),
             material: Material {

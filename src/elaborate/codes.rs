@@ -71,6 +71,8 @@ codes! {
     NONCONSERVATIVE "E0440" "a moment whose work would depend on the way";
     WEIGHTLESS "E0441" "gravity on a material that states no density";
     NO_TARGET "E0442" "the error of a trace without a target";
+    TARGET "E0450" "a target that is no path";
+    EMPHASIS "E0451" "an emphasis that is negative, or zero all over the cycle";
     LATER_STATEMENT "E0901" "a statement that is not available yet";
     LATER_TERM "E0902" "an objective, query, export or function that is not available yet";
     LATER_JOINT "E0903" "a kind of joint that is not available yet";

@@ -25,10 +25,13 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("error", "`error(trace)` stands inside `max(…)` or `mean(…)` in `require`"),
     ("torque", "`torque(drive)` stands inside `max(…)` in `require`"),
     ("arduino", "`arduino` is an export"),
+    ("angle", "`angle(BODY about D)` stands in an `output`, or inside `span(…)` in `require`"),
+    ("path", "`path(\"FILE.csv\")` is a `target` of a trace"),
+    ("points", "`points(P, Q, …)` is a `target` of a trace"),
 ];
 
 /// Functions of the target language that this version does not have.
-const LATER: &[&str] = &["angle", "path", "mirror", "turn"];
+const LATER: &[&str] = &["mirror", "turn"];
 
 /// Circles that miss by less than this part of their radii touch: room for a few hundred roundings
 /// (1.1e-16 each) in the points they are drawn from.

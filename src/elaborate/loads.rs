@@ -6,7 +6,7 @@ use super::eval::{Env, Evaluator, Failed, Outcome};
 use super::sheet::Sheet;
 use super::structure::Structure;
 use crate::diagnostic::{Diagnostic, Origin};
-use crate::ir::{Body, ExprPoint, Joint, JointKind, Load, LoadKind};
+use crate::ir::{Body, Joint, JointKind, Load, LoadKind, TargetOf};
 use crate::syntax::ast::{self, Expr, Ident};
 
 /// Sine of the angle between directions that count as parallel, cosine of those that count as square. Drawn ones are
@@ -81,7 +81,7 @@ impl<'a> Evaluator<'a> {
     }
 
     fn load_direction(&mut self, scope: usize, e: &'a Expr) -> Outcome<[f64; 3]> {
-        self.direction_of(scope, e, "the direction of a load", DIRECTION_HELP)
+        self.unit_direction(scope, e, "the direction of a load", DIRECTION_HELP)
     }
 
     /// A moment about an axis fixed in space does work that depends on the way, unless the body turns about that
@@ -108,9 +108,16 @@ impl<'a> Evaluator<'a> {
         )
     }
 
+    /// Whether the text gives a trace or a direction a target.
+    fn has_own_target(&self, of: &str) -> bool {
+        let direction = self.aims.directions.get(of).map(|i| TargetOf::Direction(*i));
+        let named = direction.or_else(|| self.aims.traces.get(of).map(|i| TargetOf::Trace(*i)));
+        named.is_some_and(|of| self.aims.made.target_of(of).is_some())
+    }
+
     /// The error of a trace needs a path to be compared with.
-    pub(super) fn needs_target(&mut self, asked: &Ident) -> Outcome<()> {
-        if !self.undriven {
+    pub(super) fn needs_target(&mut self, asked: &Ident, of: &str) -> Outcome<()> {
+        if !self.undriven || self.has_own_target(of) {
             return Ok(());
         }
         self.fail(

@@ -22,6 +22,8 @@ pub struct Outside<'s> {
     pub steps: Option<usize>,
     /// Texts, to quote lines.
     pub sources: &'s SourceMap,
+    /// Files that targets are read from.
+    pub files: &'s dyn super::Files,
 }
 
 impl<'a> Evaluator<'a> {
@@ -81,6 +83,7 @@ impl<'a> Evaluator<'a> {
                 traces.push(t);
             }
         }
+        self.aims(scope, &sheet, &s, &trace_index, cycle.as_ref().map(|c| c.steps), outside);
         let driven = drive_names(&drives, &sheet);
         let named = Named { traces: &trace_index, driven: &driven, drives: drives.as_deref() };
         let mut objectives = Vec::new();
@@ -111,6 +114,7 @@ impl<'a> Evaluator<'a> {
             loads: loads?,
             cycle: cycle?,
             traces,
+            aims: std::mem::take(&mut self.aims.made),
             objectives,
             requirements,
             material: material?,

@@ -54,6 +54,10 @@ pub struct Sheet<'a> {
     pub loads: Vec<(&'a ast::Load, Origin)>,
     pub rests: Vec<(&'a Ident, &'a Expr, Origin)>,
     pub traces: Vec<TraceText<'a>>,
+    /// Traced directions.
+    pub directions: Vec<TraceText<'a>>,
+    pub outputs: Vec<(&'a Ident, &'a Expr, Origin)>,
+    pub targets: Vec<(&'a Ident, &'a Expr, Origin)>,
     pub minimize: Option<(&'a [ast::Term], Origin)>,
     pub requires: Vec<RequireText<'a>>,
     pub exports: Vec<&'a Expr>,
@@ -163,7 +167,18 @@ impl<'a> Evaluator<'a> {
             }
             StatementKind::Load(load) => sheet.loads.push((load, at)),
             StatementKind::Rest { joint, value } => sheet.rests.push((joint, value, at)),
-            StatementKind::Trace { name, point, body } => {
+            StatementKind::Trace { name, direction: true, point, body } => {
+                if self.name_thing(scope, name, "direction") {
+                    sheet.directions.push(TraceText { name, point, body, at });
+                }
+            }
+            StatementKind::Output { name, value } => {
+                if self.name_thing(scope, name, "output") {
+                    sheet.outputs.push((name, value, at));
+                }
+            }
+            StatementKind::Target { trace, value } => sheet.targets.push((trace, value, at)),
+            StatementKind::Trace { name, point, body, .. } => {
                 if self.name_thing(scope, name, "trace") {
                     sheet.traces.push(TraceText { name, point, body, at });
                 }

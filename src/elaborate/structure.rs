@@ -313,11 +313,11 @@ impl<'a> Evaluator<'a> {
     }
 
     fn direction(&mut self, scope: usize, e: &'a Expr) -> Outcome<[f64; 3]> {
-        self.direction_of(scope, e, "an axis", "write `axis z` or `axis (0, 1, 0.25)`")
+        self.unit_direction(scope, e, "an axis", "write `axis z` or `axis (0, 1, 0.25)`")
     }
 
-    /// A unit vector; `what` it is for ("an axis"), and how one is written.
-    pub(super) fn direction_of(
+    /// A fixed direction of length one; `what` names what it is for ("an axis"), `how` how one is written.
+    pub(super) fn unit_direction(
         &mut self,
         scope: usize,
         e: &'a Expr,

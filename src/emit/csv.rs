@@ -16,6 +16,8 @@ pub struct MotionTable {
     pub has_forces: bool,
     /// Whether loads act, which have a potential.
     pub has_loads: bool,
+    /// Further columns with their values: name with unit, one value a state.
+    pub more: Vec<(String, Vec<f64>)>,
     /// The states in order.
     pub states: Vec<MotionState>,
 }
@@ -81,6 +83,7 @@ pub fn columns(table: &MotionTable) -> Vec<String> {
             out.push("load_potential_n_mm".into());
         }
     }
+    out.extend(table.more.iter().map(|(name, _)| name.clone()));
     for body in &table.bodies {
         let parts = ["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"];
         out.extend(parts.map(|part| format!("pose.{body}.{part}")));
@@ -108,6 +111,7 @@ pub fn values(table: &MotionTable, step: usize) -> Vec<Option<f64>> {
             row.push(state.load_potential_n_mm);
         }
     }
+    row.extend(table.more.iter().map(|(_, values)| at(values, step)));
     for i in 0..table.bodies.len() {
         let (translation, rotation) = state.poses.get(i).copied().unwrap_or(([f64::NAN; 3], [f64::NAN; 3]));
         row.extend(translation.into_iter().chain(rotation));
@@ -147,6 +151,7 @@ mod tests {
             bodies: vec!["coupler".into()],
             has_forces: true,
             has_loads: false,
+            more: Vec::new(),
             states: vec![MotionState {
                 drives: vec![30_f64.to_radians()],
                 traces_mm: vec![[1.5, -0.0, 0.1]],
@@ -183,6 +188,15 @@ mod tests {
         assert_eq!((names[1].as_str(), names[5].as_str()), ("drive.pull_mm", "force.pull_n"));
         assert_eq!(values(&sliding, 0)[1], Some(30_f64.to_radians()));
         assert_eq!(values(&sliding, 0)[5], Some(-2.25));
+    }
+
+    #[test]
+    fn further_columns_stand_before_the_poses() {
+        let more = vec![("output.curl_deg".to_string(), vec![12.5])];
+        let table = MotionTable { more, ..table() };
+        let names = columns(&table);
+        assert_eq!((names[8].as_str(), names[9].as_str()), ("output.curl_deg", "pose.coupler.tx_mm"));
+        assert_eq!((values(&table, 0)[8], values(&table, 0)[9]), (Some(12.5), Some(1.0)));
     }
 
     #[test]

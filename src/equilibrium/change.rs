@@ -4,7 +4,8 @@
 use super::frames::{Aim, Framed, Seen, axes, axis_carrier};
 use super::layout::Layout;
 use crate::ir::expr::Evaluated;
-use crate::ir::{BodyId, Design, ExprPoint, JointId};
+use super::target::as_curve;
+use crate::ir::{BodyId, Design, ExprPoint, JointId, TargetOf};
 use crate::kinematics::{Constraint, Motion, MotionChange, ReferenceChange, Twist, motion_changes};
 use crate::math::dual::Dual;
 use nalgebra::{Matrix3, Matrix3xX, Vector3};
@@ -24,6 +25,8 @@ pub struct LayoutChange {
     pub drives: Vec<DriveChange>,
     /// Per trace.
     pub traces: Vec<TraceChange>,
+    /// Per traced direction.
+    pub directions: Vec<DirectionChange>,
 }
 
 /// Derivatives of a [`super::RodEndFrame`].
@@ -49,7 +52,20 @@ pub struct DriveChange {
 pub struct TraceChange {
     /// Of the position in the rest pose, mm.
     pub rest: Vector3<f64>,
-    /// Of the target at every state, mm.
+    /// Of the target at every state, mm; zero where the text gives it.
+    pub target: Vec<Vector3<f64>>,
+    /// Of the corners of the target as a curve, mm.
+    pub curve: Vec<Vector3<f64>>,
+    /// Of the conventional mechanism's own path at every state, mm.
+    pub path: Vec<Vector3<f64>>,
+}
+
+/// Derivatives of a [`super::LayoutDirection`].
+#[derive(Clone, Debug)]
+pub struct DirectionChange {
+    /// Of the direction in the rest pose.
+    pub rest: Vector3<f64>,
+    /// Of the target at every state; zero where the text gives it.
     pub target: Vec<Vector3<f64>>,
 }
 
@@ -106,9 +122,25 @@ impl Making<'_> {
     fn make(self) -> LayoutChange {
         let rod_ends = (0..self.design.rods.len()).map(|r| [0, 1].map(|k| self.end_frame(r, k))).collect();
         let (constraints, drives) = (self.constraints(), self.drives());
-        let traces = self.layout.traces.iter().enumerate().map(|(i, t)| TraceChange {
-            rest: self.at_rest(t.body, &t.rest, &self.change.trace_points[i]),
-            target: self.change.paths[i].clone(),
+        let aims = &self.design.aims;
+        let traces = self.layout.traces.iter().enumerate().map(|(i, t)| {
+            let path = self.change.paths[i].clone();
+            let own = aims.target_of(TargetOf::Trace(i)).is_some();
+            let still = |n: usize| vec![Vector3::zeros(); n];
+            TraceChange {
+                rest: self.at_rest(t.body, &t.rest, &self.change.trace_points[i]),
+                target: if own { still(path.len()) } else { path.clone() },
+                curve: if own { still(t.curve.len()) } else { as_curve(&path, self.layout.closed) },
+                path,
+            }
+        });
+        let directions = self.layout.directions.iter().enumerate().map(|(i, d)| {
+            let own = aims.target_of(TargetOf::Direction(i)).is_some();
+            let path = &self.change.directions[i];
+            DirectionChange {
+                rest: self.change.rest[d.body].turn.cross(&d.rest),
+                target: if own { vec![Vector3::zeros(); path.len()] } else { path.clone() },
+            }
         });
         LayoutChange {
             parameter: self.change.parameter,
@@ -116,6 +148,7 @@ impl Making<'_> {
             constraints,
             drives,
             traces: traces.collect(),
+            directions: directions.collect(),
             bodies: self.change.rest,
         }
     }

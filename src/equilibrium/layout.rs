@@ -4,6 +4,7 @@
 use super::change::{LayoutChange, layout_changes};
 use super::design_load::LayoutLoad;
 use super::frames::{RodEndFrame, end_frames};
+use super::target::{LayoutDirection, LayoutTrace};
 use crate::ir::{BodyId, Design, RodModel};
 use crate::kinematics::{Constraint, JointValue, Motion};
 use crate::math::Pose;
@@ -30,17 +31,6 @@ pub struct LayoutDrive {
     pub values: Vec<f64>,
 }
 
-/// A traced point.
-#[derive(Clone, Debug)]
-pub struct LayoutTrace {
-    /// Body that carries it.
-    pub body: BodyId,
-    /// Position in the rest pose, mm.
-    pub rest: Vector3<f64>,
-    /// Target per state 0..=N: the conventional mechanism's own path, mm.
-    pub target: Vec<Vector3<f64>>,
-}
-
 /// See the module.
 #[derive(Clone, Debug)]
 pub struct Layout {
@@ -56,6 +46,8 @@ pub struct Layout {
     pub loads: Vec<LayoutLoad>,
     /// Traces.
     pub traces: Vec<LayoutTrace>,
+    /// Traced directions.
+    pub directions: Vec<LayoutDirection>,
     /// Whether states 0 and N are the same pose.
     pub closed: bool,
     /// Rest pose of each body relative to the drawing pose.
@@ -135,16 +127,16 @@ impl Layout {
             })
             .collect();
 
+        let closed = design.is_closed();
         let traces = design
             .traces
             .iter()
             .enumerate()
-            .map(|(i, t)| LayoutTrace {
-                body: t.body,
-                rest: at_rest(t.body, &values.point(t.point)),
-                target: motion.states.iter().map(|s| s.traces_mm[i]).collect(),
+            .map(|(i, t)| {
+                LayoutTrace::new(design, motion, i, at_rest(t.body, &values.point(t.point)), closed)
             })
             .collect();
+        let directions = LayoutDirection::all(design, motion);
 
         let rod_ends = end_frames(design, motion, &values);
 
@@ -158,7 +150,6 @@ impl Layout {
         let length_mm = (arms.0 / f64::from(arms.1.max(1))).max(1.0);
 
         let loads = LayoutLoad::of(design, motion, |p| values.point(p));
-        let closed = design.is_closed();
         let rest_poses = rest.clone();
         let mut layout = Self {
             bodies,
@@ -167,6 +158,7 @@ impl Layout {
             drives,
             loads,
             traces,
+            directions,
             closed,
             rest_poses,
             joint_points: joint_points.clone(),

@@ -15,9 +15,10 @@ mod newton;
 mod saddle;
 mod sensitivity;
 mod sweep;
+mod target;
 mod weight;
 
-pub use change::{DriveChange, EndFrameChange, LayoutChange, TraceChange};
+pub use change::{DirectionChange, DriveChange, EndFrameChange, LayoutChange, TraceChange};
 pub use design_load::{LayoutLoad, LayoutLoadKind};
 pub use frames::RodEndFrame;
 pub use layout::Layout;
@@ -26,4 +27,5 @@ pub use model::{Model, ModelError, ModelRod, State};
 pub use newton::{Equilibrium, SolveError, Solver};
 pub use sensitivity::{Sensitivity, SensitivityWorkspace};
 pub use sweep::{Cycle, SweepError, sweep};
+pub use target::{LayoutDirection, LayoutTrace, angle_between};
 pub use weight::volume_and_center;

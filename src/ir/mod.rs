@@ -1,6 +1,7 @@
 //! The narrow waist: a [`Design`] is all that elaboration hands to the numerical stages, and a
 //! [`Solution`] all that they hand back. Plain data; units are mm, N, MPa, rad, s throughout.
 
+mod aim;
 mod drive;
 pub mod expr;
 mod load;
@@ -8,6 +9,7 @@ mod model;
 mod solution;
 
 pub use crate::diagnostic::Origin;
+pub use aim::{Aims, BodyAngle, Direction, Target, TargetOf, TargetPath};
 pub use drive::{Drive, DriveUnit, Profile};
 use expr::{ExprGraph, ExprId};
 pub use load::{Load, LoadKind};
@@ -49,6 +51,9 @@ pub struct Design {
     pub cycle: Cycle,
     /// Traced points.
     pub traces: Vec<Trace>,
+    /// Traced directions, targets, angles of bodies.
+    #[serde(default, skip_serializing_if = "Aims::is_empty")]
+    pub aims: Aims,
     /// Terms of the objective.
     pub objectives: Vec<Objective>,
     /// Acceptance tests.
@@ -380,6 +385,49 @@ pub enum ObjectiveKind {
         /// Torque that counts as one: the motor's stall torque, or the scale in the text.
         reference_n_mm: f64,
     },
+    /// Tracking by form or with an emphasis of its own.
+    TrackAs {
+        /// Index into [`Design::traces`].
+        trace: usize,
+        /// Length that counts as one; none: SI (1 m).
+        scale_mm: Option<f64>,
+        /// Distance from the nearest place of the target, at whatever time; else from that of the same time.
+        closest: bool,
+        /// Weight of each time.
+        emphasis: Option<Profile>,
+    },
+    /// Angle between a traced direction and its target.
+    Aim {
+        /// Index into [`Aims::directions`].
+        direction: usize,
+        /// Angle that counts as one; none: SI (1 rad).
+        scale_rad: Option<f64>,
+        /// Weight of each time.
+        emphasis: Option<Profile>,
+    },
+    /// Displacement of a trace under one force of stated direction.
+    SwayAlong {
+        /// Index into [`Design::traces`].
+        trace: usize,
+        /// Size of the force.
+        force_n: f64,
+        /// Length that counts as one; none: SI (1 m).
+        scale_mm: Option<f64>,
+        /// Its unit direction in space; none: the in-plane normal of the conventional path.
+        along: Option<[f64; 3]>,
+    },
+    /// The paper's soft maximum of the squared torque (eq. 6).
+    PaperTorque {
+        /// Index into [`Design::drives`].
+        drive: usize,
+        /// Torque that counts as one.
+        reference_n_mm: f64,
+    },
+    /// The paper's soft maximum of von Mises stress (eq. 16).
+    PaperStress {
+        /// Stress that counts as one; none: SI (1 Pa).
+        scale_mpa: Option<f64>,
+    },
 }
 
 /// `require QUERY <= BOUND`.
@@ -431,6 +479,12 @@ pub enum Quantity {
     Torque(usize),
     /// Size of a slider drive's force, N. Index into [`Design::drives`].
     Force(usize),
+    /// Distance of a trace from the nearest place of its target, mm. Index into [`Design::traces`].
+    ErrorClosest(usize),
+    /// Angle between a traced direction and its target, rad. Index into [`Aims::directions`].
+    AimError(usize),
+    /// How far a body has turned, rad. Index into [`Aims::angles`].
+    Angle(usize),
 }
 
 /// Material data; what the text does not state is absent.

@@ -29,6 +29,8 @@ pub struct MotionChange {
     pub rest: Vec<Twist>,
     /// Per trace and state of its place, mm.
     pub paths: Vec<Vec<Vector3<f64>>>,
+    /// Per traced direction and state of it.
+    pub directions: Vec<Vec<Vector3<f64>>>,
 }
 
 /// Derivatives by every variable of [`Design::geometry_variables`] at `p`, where `motion` was solved. None at a dead
@@ -51,7 +53,7 @@ pub fn motion_changes(design: &Design, motion: &Motion, p: &[f64]) -> Option<Vec
         change.rest = at_rest.twists(&step);
     }
     for (s, state) in motion.states.iter().enumerate() {
-        if design.traces.is_empty() {
+        if design.traces.is_empty() && design.aims.directions.is_empty() {
             break;
         }
         let here = Follower::new(&mechanism, &state.poses, &state.drives)?;
@@ -60,6 +62,10 @@ pub fn motion_changes(design: &Design, motion: &Motion, p: &[f64]) -> Option<Vec
             for (t, (body, _)) in mechanism.traces.iter().enumerate() {
                 let carried = state.poses[*body].direction(&change.trace_points[t]);
                 change.paths[t][s] = twists[*body].at(&state.traces_mm[t]) + carried;
+            }
+            for (d, of) in design.aims.directions.iter().enumerate() {
+                let here = state.poses[of.body].direction(&Vector3::from(of.direction));
+                change.directions[d][s] = twists[of.body].turn.cross(&here);
             }
         }
     }
@@ -77,6 +83,7 @@ fn drawn(design: &Design, values: &Evaluated, parameter: usize, states: usize) -
         trace_points: design.traces.iter().map(|t| point(&t.point)).collect(),
         rest: vec![Twist::default(); design.bodies.len()],
         paths: vec![vec![Vector3::zeros(); states]; design.traces.len()],
+        directions: vec![vec![Vector3::zeros(); states]; design.aims.directions.len()],
     }
 }
 

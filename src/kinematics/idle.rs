@@ -72,7 +72,8 @@ pub(super) fn find(mechanism: &Mechanism) -> Vec<Idle> {
         .collect()
 }
 
-/// Direction of the line through all joint points and traces of a body, if there is one.
+/// Direction of the line through all joint points and traces of a body, if there is one and nothing else that is asked
+/// for turns with the body about it.
 fn line(mechanism: &Mechanism, body: BodyId) -> Option<Vector3<f64>> {
     let design = mechanism.design;
     let own = design.joints.iter().zip(&mechanism.joint_points).filter(|(j, _)| j.bodies.contains(&body));
@@ -82,6 +83,13 @@ fn line(mechanism: &Mechanism, body: BodyId) -> Option<Vector3<f64>> {
     let direction = far.try_normalize(ON_LINE * mechanism.length)?;
     let traced = mechanism.traces.iter().filter(|t| t.0 == body).map(|t| &t.1);
     let off = joints.into_iter().chain(traced).map(|p| direction.cross(&(p - start)).norm());
+    let aims = &design.aims;
+    let turns = |d: &crate::ir::Direction| direction.cross(&Vector3::from(d.direction)).norm() > ON_LINE;
+    if aims.angles.iter().any(|a| a.body == body)
+        || aims.directions.iter().any(|d| d.body == body && turns(d))
+    {
+        return None;
+    }
     (off.fold(0.0, f64::max) <= ON_LINE * mechanism.length).then_some(direction)
 }
 

@@ -6,7 +6,7 @@ use super::idle::{self, Idle};
 use super::value::JointValue;
 use crate::diagnostic::Diagnostic;
 use crate::ir::{Design, Drive, DriveUnit, JointId, JointKind, LoadKind};
-use crate::math::Pose;
+use crate::math::{Pose, nearest_turn, twist_about};
 use nalgebra::Vector3;
 
 /// Sizes beyond which a file is taken for a mistake.
@@ -147,10 +147,21 @@ impl<'d> Mechanism<'d> {
         carry(self.design, poses);
     }
 
-    /// Value of every joint, rad (on the branch nearest `near`) or mm; zero for joints without one.
+    /// Value of every joint, rad (on the branch nearest `near`) or mm; zero for joints without one. Then the angle of
+    /// every body that is asked for, rad, nearest to `near` too.
     pub fn joint_values(&self, poses: &[Pose], near: &[f64]) -> Vec<f64> {
         let value = |(value, near): (&Option<JointValue>, &f64)| value.map_or(0.0, |v| v.value(poses, *near));
-        self.values.iter().zip(near).map(value).collect()
+        let mut out: Vec<f64> = self.values.iter().zip(near).map(value).collect();
+        let asked = self.design.aims.angles.iter().zip(near.iter().skip(self.values.len()));
+        out.extend(asked.map(|(a, near)| {
+            nearest_turn(twist_about(&poses[a.body].rotation, &Vector3::from(a.axis)), *near)
+        }));
+        out
+    }
+
+    /// Length of [`Self::joint_values`].
+    pub(super) fn value_count(&self) -> usize {
+        self.values.len() + self.design.aims.angles.len()
     }
 }
 
@@ -198,7 +209,10 @@ fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
     let body = |id: &usize| *id < design.bodies.len();
     let joints = design.joints.iter().all(|j| j.bodies.len() > 1 && j.bodies.iter().all(body));
     let drives = design.drives.iter().all(|d| d.joint < design.joints.len());
-    let traces = design.traces.iter().all(|t| body(&t.body));
+    let aims = &design.aims;
+    let traces = design.traces.iter().all(|t| body(&t.body))
+        && aims.directions.iter().all(|d| body(&d.body))
+        && aims.angles.iter().all(|a| body(&a.body));
     let loads = design.loads.iter().all(|l| match &l.kind {
         LoadKind::Force { body: b, .. } | LoadKind::Moment { body: b, .. } => body(b),
         LoadKind::Gravity { .. } => true,

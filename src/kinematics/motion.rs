@@ -31,6 +31,8 @@ pub struct State {
     pub joint_values: Vec<f64>,
     /// Position of every trace, mm.
     pub traces_mm: Vec<Vector3<f64>>,
+    /// How far every body whose angle is asked for has turned from the drawing pose, unwrapped, rad.
+    pub angles_rad: Vec<f64>,
 }
 
 /// Solved motion.
@@ -163,7 +165,9 @@ fn standing(mechanism: &Mechanism, mobility: Mobility) -> Result<Motion, Vec<Dia
 
 fn state(mechanism: &Mechanism, mut sample: Sample) -> State {
     mechanism.carry(&mut sample.poses);
+    let angles_rad = sample.values.split_off(mechanism.values.len());
     State {
+        angles_rad,
         traces_mm: mechanism.trace_points(&sample.poses),
         drives: sample.drive,
         poses: sample.poses,

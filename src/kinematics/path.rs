@@ -116,7 +116,7 @@ impl<'m, 'd> Branch<'m, 'd> {
         if at.factor.least_pivot < DEAD_POINT {
             return None;
         }
-        let values = vec![0.0; mechanism.values.len()];
+        let values = vec![0.0; mechanism.value_count()];
         Some(Self {
             mechanism,
             scales: mechanism.drives.iter().map(|d| mechanism.drive_scale(d)).collect(),

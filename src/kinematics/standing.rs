@@ -13,6 +13,7 @@ use nalgebra::Vector3;
 /// The one state of a mechanism that stands as drawn.
 pub(super) fn drawn(mechanism: &Mechanism) -> State {
     State {
+        angles_rad: vec![0.0; mechanism.design.aims.angles.len()],
         drives: Vec::new(),
         poses: mechanism.drawing.clone(),
         joint_values: vec![0.0; mechanism.values.len()],

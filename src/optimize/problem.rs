@@ -61,17 +61,15 @@ impl Trial<'_> {
         self.cycle.states.iter().map(|s| s.max_stress_mpa(&self.model)).fold(0.0, f64::max)
     }
 
-    /// Largest distance of any trace from its target, mm; none without a trace or a target.
+    /// Largest distance of any trace from its target, mm: from the place of the same time, or where it is tracked
+    /// by form only, from the nearest one. None without a trace or a target.
     pub fn max_error_mm(&self) -> Option<f64> {
         let layout = &self.model.layout;
-        if layout.drives.is_empty() {
-            // What stands still is no target.
-            return None;
-        }
         let mut largest = None;
-        for trace in &layout.traces {
+        for trace in layout.traces.iter().filter(|t| t.has_target) {
             for (state, target) in self.cycle.states.iter().zip(&trace.target) {
                 let z = state.state.poses[trace.body].point(&trace.rest);
+                let target = if trace.has_no_phase { trace.nearest(&z).place } else { *target };
                 largest = Some((z - target).norm().max(largest.unwrap_or(0.0)));
             }
         }

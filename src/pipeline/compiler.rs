@@ -1,6 +1,7 @@
 //! The real stages: the only place where the pipeline touches elaboration, kinematics, equilibrium,
 //! optimisation and geometry.
 
+use super::aims::AimSeries;
 use super::progress::Iteration;
 use super::report::Artefact;
 use super::solids;
@@ -64,15 +65,17 @@ impl Stages for Compiler {
                 ..MotionState::default()
             })
             .collect();
+        let aims = AimSeries::conventional(design, &motion);
         Ok(Simulation {
-            motion: table(design, false, states),
+            motion: MotionTable { more: aims.columns(design), ..table(design, false, states) },
+            aims,
             diagnostics: motion.warnings,
             ..Simulation::default()
         })
     }
 
     fn simulate(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
-        let (layout, _) = layout(design, values)?;
+        let (layout, motion) = layout(design, values)?;
         let model = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
         let cycle = sweep(&model).map_err(|e| lost(design, &e))?;
         let states = cycle.states.iter().enumerate().map(|(s, e)| MotionState {
@@ -87,12 +90,13 @@ impl Stages for Compiler {
         let errors_mm = layout
             .traces
             .iter()
-            .map(|t| {
+            .enumerate()
+            .map(|(i, t)| {
                 let distance = |(e, target): (&crate::equilibrium::Equilibrium, &Vector3<f64>)| {
                     (e.state.poses[t.body].point(&t.rest) - target).norm()
                 };
                 // Without a drive the conventional mechanism stands still: that is no target.
-                let states = if design.is_driven() { cycle.states.as_slice() } else { &[] };
+                let states = if design.has_target(i) { cycle.states.as_slice() } else { &[] };
                 states.iter().zip(&t.target).map(distance).collect()
             })
             .collect();
@@ -101,8 +105,9 @@ impl Stages for Compiler {
         diagnostics.extend(solids::not_carved(design, &carving));
         diagnostics.extend(solids::collisions(design, &gaps));
         let gaps_mm = gaps.least.iter().filter_map(|g| g.map(|g| g.gap_mm)).collect();
-        let motion = table(design, true, states.collect());
-        Ok(Simulation { motion, errors_mm, gaps_mm, diagnostics })
+        let aims = AimSeries::compliant(design, &layout, &motion, &cycle);
+        let motion = MotionTable { more: aims.columns(design), ..table(design, true, states.collect()) };
+        Ok(Simulation { motion, errors_mm, aims, gaps_mm, diagnostics })
     }
 
     fn optimize(
@@ -144,7 +149,10 @@ impl Stages for Compiler {
             // Say why, by simulating the start once more.
             self.simulate(design, start)?;
             let message = "the optimiser has nowhere to begin: an objective cannot be computed at the start";
-            let loaded = design.objectives.iter().find(|o| matches!(o.kind, ObjectiveKind::Sway { .. }));
+            let loaded = design
+                .objectives
+                .iter()
+                .find(|o| matches!(o.kind, ObjectiveKind::Sway { .. } | ObjectiveKind::SwayAlong { .. }));
             let at = loaded.map_or(design.origin, |o| o.origin);
             return Err(vec![
                 Diagnostic::error("E0611", message, at)
@@ -215,6 +223,7 @@ fn table(design: &Design, has_forces: bool, states: Vec<MotionState>) -> MotionT
         has_forces,
         has_loads: !design.loads.is_empty(),
         states,
+        ..MotionTable::default()
     }
 }
 

@@ -1,6 +1,7 @@
 //! The whole way from text to artefacts, as one function to be read from top to bottom. No I/O here:
 //! files come in through [`Files`], artefacts go out as names and bytes, time and threads come from outside.
 
+mod aims;
 mod compiler;
 mod measure;
 mod progress;
@@ -8,6 +9,7 @@ mod report;
 mod solids;
 mod stages;
 
+pub use aims::{AimSeries, DirectionMeasures, OutputMeasures};
 pub use compiler::{Compiler, EDGES};
 pub use measure::{aggregate, check_requirements, is_closed, measure};
 pub use progress::{Iteration, Progress, Stage};

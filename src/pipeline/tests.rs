@@ -51,6 +51,7 @@ fn design() -> Design {
         loads: Vec::new(),
         cycle: Cycle { steps: 4, duration_s: 2.0, origin },
         traces: vec![Trace { name: "tip".into(), body: 0, point: [zero; 3], origin }],
+        aims: Default::default(),
         objectives: vec![Objective {
             kind: ObjectiveKind::Track { trace: 0, scale_mm: None },
             weight: 1.0,

@@ -184,14 +184,30 @@ pub enum StatementKind {
         /// Its value in the rest pose (may be `free`).
         value: Expr,
     },
-    /// `trace NAME = P on BODY`
+    /// `trace NAME = P on BODY`, `trace NAME = direction D on BODY`
     Trace {
         /// Name.
         name: Ident,
-        /// Point.
+        /// `direction` was written.
+        direction: bool,
+        /// Point or direction.
         point: Expr,
         /// Body.
         body: Ident,
+    },
+    /// `output NAME = angle(BODY about D)`
+    Output {
+        /// Name.
+        name: Ident,
+        /// What is measured.
+        value: Expr,
+    },
+    /// `target TRACE = …`
+    Target {
+        /// The trace.
+        trace: Ident,
+        /// A file, a list of points, or an expression of t.
+        value: Expr,
     },
     /// `minimize { TERM [weight W] … }`
     Minimize(Vec<Term>),
@@ -407,6 +423,13 @@ pub enum ExprKind {
         lower: Box<Expr>,
         /// Upper bound.
         upper: Box<Expr>,
+    },
+    /// `BODY about D`: only as an argument of `angle`.
+    About {
+        /// The body that turns.
+        body: Ident,
+        /// The axis.
+        axis: Box<Expr>,
     },
     /// What could not be understood; a diagnostic has been given already.
     Broken,

@@ -88,6 +88,8 @@ fn is_weak(rule: Rule) -> bool {
             | Rule::unit_power
             | Rule::dot
             | Rule::lparen
+            | Rule::kw_about
+            | Rule::kw_direction
     )
 }
 
@@ -240,6 +242,8 @@ fn kind(rule: Rule) -> Kind {
         Rule::drum => Kind::Drum,
         Rule::st_rest => Kind::Rest,
         Rule::st_trace => Kind::Trace,
+        Rule::st_output => Kind::Output,
+        Rule::st_target => Kind::Target,
         Rule::st_minimize => Kind::Minimize,
         Rule::term => Kind::Term,
         Rule::st_require => Kind::Require,
@@ -265,6 +269,7 @@ fn kind(rule: Rule) -> Kind {
         Rule::tuple => Kind::Tuple,
         Rule::call => Kind::Call,
         Rule::argument => Kind::Argument,
+        Rule::about => Kind::About,
         Rule::name => Kind::Name,
         Rule::number => Kind::Number,
         Rule::unit => Kind::Unit,

@@ -62,8 +62,11 @@ impl Lower<'_> {
             Kind::Trace => {
                 let mut names = self.idents(node).into_iter();
                 let (name, body) = (names.next()?, names.next()?);
-                StatementKind::Trace { name, point: self.value(node)?, body }
+                let direction = node.all(Kind::Keyword).any(|n| self.text(n) == "direction");
+                StatementKind::Trace { name, direction, point: self.value(node)?, body }
             }
+            Kind::Output => StatementKind::Output { name: self.ident(node)?, value: self.value(node)? },
+            Kind::Target => StatementKind::Target { trace: self.ident(node)?, value: self.value(node)? },
             Kind::Minimize => self.minimize(node),
             Kind::Require => self.require(node)?,
             Kind::Export => StatementKind::Export(

@@ -95,6 +95,8 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "drive" => "drive JOINT from VALUE to VALUE with MOTOR",
         "rest" => "rest JOINT at VALUE",
         "trace" => "trace NAME = POINT on BODY",
+        "output" => "output NAME = angle(BODY about AXIS)",
+        "target" => "target TRACE = path(\"FILE.csv\")",
         "minimize" => "minimize {",
         "term" => "TERM(…) weight NUMBER",
         "field" => "NAME = VALUE",

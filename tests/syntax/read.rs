@@ -60,6 +60,7 @@ fn grouped(kind: &ExprKind) -> String {
         ExprKind::Free { start, lower, upper } => {
             format!("free {} in {} .. {}", grouped(&start.kind), grouped(&lower.kind), grouped(&upper.kind))
         }
+        ExprKind::About { body, axis } => format!("({} about {})", body.node, grouped(&axis.kind)),
         ExprKind::Broken => "broken".into(),
     }
 }

@@ -2,14 +2,16 @@
 //!
 //! A term is a sum over the states ([`Objective`]) or a soft maximum over all of them ([`Sampled`]).
 
+mod aim;
 mod collision;
+mod paper;
 mod soft_maximum;
 mod stress;
 mod sway;
 mod torque;
 mod track;
 
-pub use soft_maximum::{Level, Sampled};
+pub use soft_maximum::{Level, Sampled, SoftForm};
 
 use crate::equilibrium::{Equilibrium, Layout, Model, PointForce, PointForceChange, Sensitivity};
 use crate::geometry::SkeletonCapsule;
@@ -105,6 +107,36 @@ pub fn build(design: &Design, layout: &Layout) -> (Vec<Term>, Vec<Vec<PointForce
                 let name = &design.drives[*drive].name;
                 Term::Peak(Box::new(torque::Torque::new(name, *drive, *reference_n_mm, o.weight)))
             }
+            ObjectiveKind::TrackAs { trace, scale_mm, closest, emphasis } => {
+                let name = &design.traces[*trace].name;
+                let emphasis = track::Emphasis::new(emphasis.as_ref(), design.cycle.steps);
+                let term = track::Track::with(name, *trace, *scale_mm, o.weight, *closest, emphasis);
+                Term::Sum(Box::new(term))
+            }
+            ObjectiveKind::Aim { direction, scale_rad, emphasis } => {
+                let name = &design.aims.directions[*direction].name;
+                let emphasis = track::Emphasis::new(emphasis.as_ref(), design.cycle.steps);
+                Term::Sum(Box::new(aim::Aim::new(name, *direction, *scale_rad, o.weight, emphasis)))
+            }
+            ObjectiveKind::SwayAlong { trace, force_n, scale_mm, along } => {
+                let first = cases.len();
+                match along {
+                    Some(along) => cases.push(sway::load_along(layout, *trace, *force_n, *along)),
+                    None => {
+                        cases.extend(sway::load_cases(design, layout, *trace, *force_n).into_iter().take(1))
+                    }
+                }
+                let name = &design.traces[*trace].name;
+                let term = sway::Sway::new(name, *trace, first..cases.len(), *scale_mm, o.weight);
+                Term::Sum(Box::new(term))
+            }
+            ObjectiveKind::PaperTorque { drive, reference_n_mm } => {
+                let name = &design.drives[*drive].name;
+                Term::Peak(Box::new(paper::PaperTorque::new(name, *drive, *reference_n_mm, o.weight)))
+            }
+            ObjectiveKind::PaperStress { scale_mpa } => {
+                Term::Peak(Box::new(paper::PaperStress::new(*scale_mpa, o.weight)))
+            }
         })
         .collect();
     (terms, cases)
@@ -114,8 +146,18 @@ pub fn build(design: &Design, layout: &Layout) -> (Vec<Term>, Vec<Vec<PointForce
 pub fn load_changes(design: &Design, layout: &Layout) -> Vec<Vec<Vec<PointForceChange>>> {
     let mut changes = Vec::new();
     for o in &design.objectives {
-        if let ObjectiveKind::Sway { trace, force_n, .. } = &o.kind {
-            changes.extend(sway::load_case_changes(design, layout, *trace, *force_n));
+        match &o.kind {
+            ObjectiveKind::Sway { trace, force_n, .. } => {
+                changes.extend(sway::load_case_changes(design, layout, *trace, *force_n));
+            }
+            ObjectiveKind::SwayAlong { trace, force_n, along: None, .. } => {
+                let both = sway::load_case_changes(design, layout, *trace, *force_n);
+                changes.extend(both.into_iter().take(1));
+            }
+            ObjectiveKind::SwayAlong { trace, along: Some(_), .. } => {
+                changes.push(sway::load_along_change(layout, *trace));
+            }
+            _ => {}
         }
     }
     changes

@@ -5,7 +5,7 @@
 //! and binormal, for planar mechanisms the hinge axis as binormal.
 
 use super::{Objective, StateView, StatesSensitivity, trace_rows};
-use crate::equilibrium::{Layout, PointForce, PointForceChange};
+use crate::equilibrium::{Layout, LayoutChange, LayoutTrace, PointForce, PointForceChange};
 use crate::ir::Design;
 use crate::optimize::Normal;
 use nalgebra::Vector3;
@@ -83,7 +83,7 @@ impl Objective for Sway {
 /// The two load cases of a trace: one force a state, normal and binormal of its conventional path.
 pub fn load_cases(design: &Design, layout: &Layout, trace: usize, force_n: f64) -> [Vec<PointForce>; 2] {
     let t = &layout.traces[trace];
-    let normals = path_normals(&t.target, layout.closed, plane(design));
+    let normals = path_normals(&t.path, layout.closed, plane(design));
     let force = |n: Vector3<f64>| PointForce { body: t.body, rest: t.rest, force_n: n * force_n };
     [0, 1].map(|k| normals.iter().map(|n| force(n[k])).collect())
 }
@@ -95,11 +95,11 @@ pub fn load_case_changes(
     trace: usize,
     force_n: f64,
 ) -> [Vec<Vec<PointForceChange>>; 2] {
-    let target = &layout.traces[trace].target;
+    let path = &layout.traces[trace].path;
     let mut out = [Vec::new(), Vec::new()];
     for change in layout.changes.iter().flatten() {
         let moved = &change.traces[trace];
-        let normals = moving_normals(target, &moved.target, layout.closed, plane(design));
+        let normals = moving_normals(path, &moved.path, layout.closed, plane(design));
         for (k, case) in out.iter_mut().enumerate() {
             let force = |n: &[Moving; 2]| PointForceChange { rest: moved.rest, force_n: n[k].rate * force_n };
             case.push(normals.iter().map(force).collect());
@@ -113,6 +113,22 @@ fn plane(design: &Design) -> Option<Vector3<f64>> {
     let axis = Vector3::from(design.layers.axis);
     let planar = design.joints.iter().all(|j| Vector3::from(j.axis).cross(&axis).norm() < PARALLEL);
     planar.then_some(axis)
+}
+
+/// The one load case of a stated direction.
+pub fn load_along(layout: &Layout, trace: usize, force_n: f64, along: [f64; 3]) -> Vec<PointForce> {
+    let LayoutTrace { body, rest, .. } = &layout.traces[trace];
+    let force_n = Vector3::from(along) * force_n;
+    vec![PointForce { body: *body, rest: *rest, force_n }; layout.states()]
+}
+
+/// How it changes with each of the layout's changes: per change and state.
+pub fn load_along_change(layout: &Layout, trace: usize) -> Vec<Vec<PointForceChange>> {
+    let moved = |change: &LayoutChange| PointForceChange {
+        rest: change.traces[trace].rest,
+        force_n: Vector3::zeros(),
+    };
+    layout.changes.iter().flatten().map(|c| vec![moved(c); layout.states()]).collect()
 }
 
 /// Normal and binormal of a path at each of its points. Where the path stops or turns back the line of the
