@@ -32,7 +32,7 @@ fn check(name: &str, steps: usize, moving: usize, nth: usize) {
 
 #[test]
 fn chebyshev() {
-    check("chebyshev", 6, 6, 4);
+    check("chebyshev", 6, 6, 8);
 }
 
 #[test]
@@ -57,7 +57,7 @@ fn jansen() {
 
 #[test]
 fn eye() {
-    check("eye", 4, 5, 5);
+    check("eye", 4, 5, 8);
 }
 
 /// Lengths at which the drawing cannot be assembled are no design, and the ones beside them are.
