@@ -653,3 +653,25 @@ fn split(text: &str) -> Vec<String> {
     }
     out
 }
+
+#[test]
+fn the_rest_pose_may_be_free() {
+    let free = |value: &str| CHEBYSHEV.replace("rest  motor at 30 deg", &format!("rest  motor at {value}"));
+    let d = design(run(&free("free 30 deg in 0 deg .. 90 deg")));
+    let i = d.free.iter().position(|f| f.path == "motor.rest").unwrap();
+    assert_eq!((d.free[i].unit.as_str(), d.free[i].lower), ("rad", 0.0));
+    assert_eq!(d.geometry_variables(), [i]);
+    let mut p: Vec<f64> = d.free.iter().map(|f| f.start).collect();
+    p[i] = 1.0;
+    let drive = &d.drives[0];
+    assert!((drive.rest - PI / 6.0).abs() < 1e-15 && drive.rest_value(&d.exprs.values(&p)) == 1.0);
+    let again: flexura::ir::Design = serde_json::from_str(&serde_json::to_string(&d).unwrap()).unwrap();
+    assert_eq!(again.drives[0].free_rest, drive.free_rest);
+    let codes = |text: &str| run(text).diagnostics.iter().map(|d| d.code.clone()).collect::<Vec<_>>();
+    assert_eq!(codes(&free("free 3 mm in 1 mm .. 4 mm")), ["E0201"]);
+    assert_eq!(codes(&free("1 / 0 * 30 deg")), ["E0302"]);
+    // A number of the command line takes the place of the free value.
+    let fixed = design(run_with(&free("free 30 deg in 0 deg .. 90 deg"), &[("motor.rest", "40 deg")]));
+    assert_eq!(fixed.drives[0].free_rest, None);
+    assert!((fixed.drives[0].rest - 40.0_f64.to_radians()).abs() < 1e-15);
+}

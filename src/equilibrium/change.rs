@@ -82,9 +82,8 @@ impl Layout {
         let pose = &self.rest_poses[body];
         let at = pose.point(&values.point(drawn));
         let gradients = drawn.map(|id| values.gradient(id));
-        let by = |c: usize, i: usize| gradients[c].get(i).copied().unwrap_or(0.0);
-        let mut out = Matrix3xX::from_fn(n, |c, i| by(c, i));
-        out = pose.rotation * out;
+        let drawn = Matrix3xX::from_fn(n, |c, i| gradients[c].get(i).copied().unwrap_or(0.0));
+        let mut out = pose.rotation * drawn;
         for change in self.changes.as_ref()? {
             let mut column = out.column_mut(change.parameter);
             column += change.bodies[body].at(&at);

@@ -101,6 +101,7 @@ impl Stages for Compiler {
             })
             .collect();
         let mut diagnostics = judge(design, &layout, &cycle);
+        diagnostics.extend(news(design, &motion));
         let (gaps, carving) = solids::gaps(design, &layout, &model, &cycle);
         diagnostics.extend(solids::not_carved(design, &carving));
         diagnostics.extend(solids::collisions(design, &gaps));
@@ -203,6 +204,16 @@ impl Stages for Compiler {
 pub(super) fn layout(design: &Design, values: &[f64]) -> Result<(Layout, Motion), Failed> {
     let motion = solve_motion(design, values)?;
     Ok((Layout::new(design, &motion, values), motion))
+}
+
+/// Findings of the conventional motion where free variables have moved it: those at the start are told by the check.
+fn news(design: &Design, motion: &Motion) -> Vec<Diagnostic> {
+    if design.geometry_variables().is_empty() || motion.warnings.is_empty() {
+        return Vec::new();
+    }
+    let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
+    let told = solve_motion(design, &start).map(|m| m.warnings).unwrap_or_default();
+    motion.warnings.iter().filter(|w| !told.contains(w)).cloned().collect()
 }
 
 /// The geometry is to vary, but the conventional motion cannot be differentiated at the start.

@@ -139,6 +139,21 @@ pub fn check_layout(design: &Design, seed: u64) {
                 worst.add(kind, &design.free[i].path, e * width, d);
             }
         }
+        // Fixed points of the drawing show the motion of each rest pose, idle turns too.
+        let corners = [Vector3::zeros(), Vector3::x() * 10.0, Vector3::y() * 10.0, Vector3::z() * 10.0];
+        let places = |l: &Layout| -> Vec<f64> {
+            let all = l.rest_poses.iter().flat_map(|pose| corners.iter().map(|x| pose.point(x)));
+            all.flat_map(|x| [x.x, x.y, x.z]).collect()
+        };
+        let by = differences(design, &p, i, |q| layout(design, q), places);
+        let mut by = by.iter();
+        for (pose, twist) in here.rest_poses.iter().zip(&change.bodies) {
+            for x in corners.iter().map(|x| twist.at(&pose.point(x))) {
+                for e in x.iter() {
+                    worst.add("rest poses", &design.free[i].path, e * width, *by.next().unwrap());
+                }
+            }
+        }
         // Skeleton points by the accessor that others use.
         let values = design.exprs.evaluate(&p);
         for (b, body) in design.bodies.iter().enumerate() {
