@@ -4,7 +4,7 @@
 //!
 //! | pair | counts |
 //! | --- | --- |
-//! | link, link | unless a conventional joint joins them: it holds them together |
+//! | link, link | but for two eyes of one conventional joint: there they are held together |
 //! | flexure, link | unless the flexure is attached to it: the link is carved instead |
 //! | flexure, flexure | of different joints; of one joint only where they overlap, away from their ends |
 
@@ -12,6 +12,7 @@ mod kernel;
 mod strip;
 
 use super::{Objective, StateView, StatesSensitivity};
+use crate::geometry::link::Role;
 use crate::ir::{Design, Section};
 use crate::optimize::Normal;
 use nalgebra::{DMatrix, DVector};
@@ -34,8 +35,6 @@ pub struct Collision {
     copies: Vec<usize>,
     /// Per rod its joint.
     joints: Vec<usize>,
-    /// Pairs of bodies a conventional joint joins, smaller first.
-    joined: Vec<(usize, usize)>,
 }
 
 /// Where a strip comes from.
@@ -56,18 +55,11 @@ impl Collision {
             let [a, b] = section.half_widths().map(|id| values[id.0 as usize]);
             (b / a).ceil().clamp(1.0, MOST_COPIES) as usize
         };
-        let mut joined = Vec::new();
-        for joint in design.joints.iter().filter(|j| !j.is_compliant()) {
-            for (k, a) in joint.bodies.iter().enumerate() {
-                joined.extend(joint.bodies.iter().skip(k + 1).map(|b| (*a.min(b), *a.max(b))));
-            }
-        }
         Self {
             gap_mm,
             weight,
             copies: design.rods.iter().map(|r| copies(&r.section)).collect(),
             joints: design.rods.iter().map(|r| r.joint).collect(),
-            joined,
         }
     }
 
@@ -92,8 +84,9 @@ impl Collision {
         };
         for (i, first) in links.iter().enumerate() {
             for (j, second) in links.iter().enumerate().skip(i + 1) {
-                let (a, b) = (view.capsules[i].body, view.capsules[j].body);
-                if a != b && !self.joined.contains(&(a.min(b), a.max(b))) {
+                let (a, b) = (&view.capsules[i], &view.capsules[j]);
+                let held = matches!((a.role, b.role), (Role::Eye(p), Role::Eye(q)) if p == q);
+                if a.body != b.body && !held {
                     compare((Source::Link(i), first), (Source::Link(j), second), self.gap_mm);
                 }
             }
