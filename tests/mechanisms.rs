@@ -71,11 +71,11 @@ fn check(expected: &Expected) {
 
     assert_eq!((design.rods.len(), design.free.len()), (expected.rods, expected.free), "{name}");
     assert!(states.iter().all(|s| s.stable), "{name} buckles");
-    for rod in &model.rods {
+    for (rod, told) in model.rods.iter().zip(&design.rods) {
         let thickness = 2.0 * rod.rod.parameters().a;
-        assert!(rod.rod.length_mm() >= LEAST_SLENDERNESS * thickness, "{name}: {}", rod.rod.length_mm());
+        assert!(rod.rod.length_mm() >= LEAST_SLENDERNESS * thickness, "{}", told.path);
         let worst = rod.rod.shape_excesses().iter().map(|e| e.0).fold(f64::MIN, f64::max);
-        assert!(worst <= 0.0, "{name}: {worst}");
+        assert!(worst <= 0.0, "{name}: {} {worst}", told.path);
     }
     if layout.closed {
         let (first, last) = (&states[0].state.poses, &states[states.len() - 1].state.poses);

@@ -378,7 +378,7 @@ fn end_frames_follow_the_kind_of_joint() {
 /// flexures' own, against differences of fourth order.
 #[test]
 fn derivatives_hold_with_flexures_of_every_kind() {
-    for name in ["eye", "car", "jansen"] {
+    for (name, some) in [("eye", 3), ("car", 3), ("jansen", 2)] {
         let path = format!("{}/tests/mechanisms/{name}.mech", env!("CARGO_MANIFEST_DIR"));
         let text = std::fs::read_to_string(path).unwrap();
         let files = BTreeMap::from([("main.mech".to_string(), text)]);
@@ -396,7 +396,7 @@ fn derivatives_hold_with_flexures_of_every_kind() {
         let row = model.rows() - 1;
         let size = states.iter().map(|e| e.state.lambda[row].abs()).fold(1.0, f64::max);
         let mut worst = 0.0f64;
-        for i in (0..p.len()).step_by(p.len() / 3) {
+        for i in (0..p.len()).step_by(p.len() / some) {
             let width = design.free[i].upper - design.free[i].lower;
             let step = 1e-3 * width;
             let shifted = [-2.0, -1.0, 1.0, 2.0].map(|k| {
@@ -429,7 +429,7 @@ fn derivatives_hold_with_flexures_of_every_kind() {
         let x = problem.to_unit(&p);
         let trial = problem.simulate(&x).unwrap();
         let gradient = problem.differentiate(&trial).unwrap().gradient();
-        for i in (3..x.len()).step_by(x.len() / 3) {
+        for i in (3..x.len()).step_by(x.len() / some) {
             let value = |factor: f64| {
                 let mut y = x.clone();
                 y[i] += factor * 2e-4;
