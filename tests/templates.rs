@@ -204,7 +204,7 @@ mechanism gimbal {{
     link   crank {{ M }}
     link   plate {{ C, Q }}
     hinge  idle:  base to crank at M axis y
-    universal cross: base to plate at C axis y and x into plate toward Q as universal_leaves {{ size = 10 mm, outer = 0.6 mm, inner = 0.8 mm, strip = 4 mm, wide = 6 mm }}
+    universal cross: base to plate at C axis y and x into plate toward Q as universal_leaves {{ size = 10 mm, outer = 0.6 mm, inner = 0.8 mm, strip = 4 mm }}
     hinge  shaft: base to plate at C axis {driven}
 {TAIL}    cycle 2 steps over 1 s
     drive shaft from 0 deg to 0.1 deg
@@ -215,17 +215,14 @@ mechanism gimbal {{
     )
 }
 
-/// About each axis one member bends over its thin side and the other over its wide one, in series. The shaft holds what
-/// bending would shorten by L θ²/24: at 0.1° that adds 4e-4.
+/// About each axis one pair of strips bends; the other, whose strips stand apart along the first, is 3000 times as
+/// stiff. The shaft holds what bending would shorten by L θ²/24: at 0.1° that adds 4e-4.
 #[test]
 fn universal_leaves_bend_about_each_of_their_axes() {
-    let (reach, thin) = (10.0, [ellipse_inertia(0.6, 4.0) * 2.0, ellipse_inertia(0.8, 6.0)]);
-    // About the other's axis: of the strips mostly their distance, so stiff that it does not count.
-    let wide = [ellipse_inertia(6.0, 0.8), f64::INFINITY];
-    for (axis, i) in [("y", 0), ("x", 1)] {
+    for (axis, thick) in [("y", 0.6), ("x", 0.8)] {
         let (torque, angle) = solved(&gimbal(axis), &[]).last_load();
-        let compliance = 2.0 * reach / E_MPA * (1.0 / thin[i] + 1.0 / wide[i]);
-        let found = torque / angle * compliance;
+        let want = 2.0 * E_MPA * ellipse_inertia(thick, 4.0) / 20.0;
+        let found = torque / angle / want;
         assert!((found - 1.0).abs() < 1e-3, "{axis}: {torque} N mm at {angle} rad: {found}");
     }
 }
@@ -341,7 +338,7 @@ fn end_frames_follow_the_kind_of_joint() {
         let i = found.design.rods.iter().position(|r| r.path == rod).unwrap();
         (&found.layout.rod_ends[i], &found.design.rods[i])
     };
-    let (ends, _) = frames("cross.left");
+    let (ends, _) = frames("cross.outer_left");
     let column = |k: usize, c: usize, ends: &[flexura::equilibrium::RodEndFrame; 2]| {
         ends[k].axes.column(c).into_owned()
     };
@@ -350,7 +347,7 @@ fn end_frames_follow_the_kind_of_joint() {
         assert!((column(k, 2, ends) - Vector3::y()).norm() < 1e-12);
         assert!((column(k, 0, ends) + Vector3::z()).norm() < 1e-12);
     }
-    let (ends, rod) = frames("cross.middle");
+    let (ends, rod) = frames("cross.inner_left");
     assert!(rod.second_axis);
     let ring = found.body("cross.ring");
     assert_eq!((rod.from.body, rod.to.body), (ring, found.body("plate")));
@@ -381,7 +378,7 @@ fn end_frames_follow_the_kind_of_joint() {
 /// flexures' own, against differences of fourth order.
 #[test]
 fn derivatives_hold_with_flexures_of_every_kind() {
-    for name in ["eye", "car", "jansen"] {
+    for (name, some) in [("eye", 3), ("car", 3), ("jansen", 2)] {
         let path = format!("{}/tests/mechanisms/{name}.mech", env!("CARGO_MANIFEST_DIR"));
         let text = std::fs::read_to_string(path).unwrap();
         let files = BTreeMap::from([("main.mech".to_string(), text)]);
@@ -399,7 +396,7 @@ fn derivatives_hold_with_flexures_of_every_kind() {
         let row = model.rows() - 1;
         let size = states.iter().map(|e| e.state.lambda[row].abs()).fold(1.0, f64::max);
         let mut worst = 0.0f64;
-        for i in (0..p.len()).step_by(p.len() / 5) {
+        for i in (0..p.len()).step_by(p.len() / some) {
             let width = design.free[i].upper - design.free[i].lower;
             let step = 1e-3 * width;
             let shifted = [-2.0, -1.0, 1.0, 2.0].map(|k| {
@@ -432,7 +429,7 @@ fn derivatives_hold_with_flexures_of_every_kind() {
         let x = problem.to_unit(&p);
         let trial = problem.simulate(&x).unwrap();
         let gradient = problem.differentiate(&trial).unwrap().gradient();
-        for i in (3..x.len()).step_by(x.len() / 4) {
+        for i in (3..x.len()).step_by(x.len() / some) {
             let value = |factor: f64| {
                 let mut y = x.clone();
                 y[i] += factor * 2e-4;
