@@ -284,6 +284,13 @@ fn a_bar_slides_in_its_sleeve() {
     };
     for poses in &layout.conventional {
         let (p, c) = (&poses[palm], &poses[carriage]);
+        for (r, a) in &parts.plans[palm].slots {
+            for (q, b) in &parts.plans[carriage].slots {
+                let gap = separation(&a.moved(p), &b.moved(c)).gap_mm;
+                let guides = matches!((r, q), (Role::Guide(_), Role::Guide(_)));
+                assert!(guides || gap >= input.clearance_mm, "{r:?} {a:?} {q:?} {b:?}: {gap}");
+            }
+        }
         let faces = least(&of(palm, p, true), &of(carriage, c, true));
         assert!((faces - input.clearance_mm).abs() < ROUNDING_MM, "{faces}");
         for (first, second) in [(true, false), (false, true), (false, false)] {

@@ -12,13 +12,14 @@ use std::collections::BTreeMap;
 const TRACK_WEIGHT: f64 = 1e5;
 const SWAY_WEIGHT: f64 = 5e5;
 const TORQUE_WEIGHT: f64 = 10.0;
+const COLLISION_WEIGHT: f64 = 1e7;
 const STRESS_WEIGHT: f64 = 1e-6;
 /// Each force of `sway` where the text is silent (the paper's, section 5).
 const SWAY_FORCE_N: f64 = 1.0;
 
 /// Objectives and queries of the target language that this version does not have.
-const LATER_TERMS: &[&str] = &["collision", "force", "gap", "buckling", "tension", "multistable", "mass"];
-const TERMS: &[&str] = &["track", "sway", "torque", "stress"];
+const LATER_TERMS: &[&str] = &["force", "gap", "buckling", "tension", "multistable", "mass"];
+const TERMS: &[&str] = &["track", "sway", "torque", "collision", "stress"];
 
 /// What terms may name.
 pub(super) struct Named<'n> {
@@ -50,6 +51,7 @@ impl<'a> Evaluator<'a> {
             "track" => self.track(scope, function, arguments, named)?,
             "sway" => self.sway(scope, function, arguments, named)?,
             "torque" => self.torque(scope, function, arguments, named)?,
+            "collision" => self.collision(scope, function, arguments)?,
             "stress" => self.stress(scope, function, arguments)?,
             name if LATER_TERMS.contains(&name) => return self.later(codes::LATER_TERM, name, function.at),
             _ => return self.unknown_of(function, "objective", TERMS),
@@ -128,6 +130,19 @@ impl<'a> Evaluator<'a> {
                     )),
             ),
         }
+    }
+
+    fn collision(
+        &mut self,
+        scope: usize,
+        function: &'a Ident,
+        arguments: &'a [Argument],
+    ) -> Outcome<(ObjectiveKind, f64)> {
+        let slots = self.arguments(function, arguments, &["gap"], 1)?;
+        let gap_mm = self
+            .positive(scope, slots.first().copied().flatten(), Dimension::LENGTH, "a gap")?
+            .ok_or(Failed)?;
+        Ok((ObjectiveKind::Collision { gap_mm }, COLLISION_WEIGHT))
     }
 
     fn stress(

@@ -6,7 +6,7 @@
 //! is left (bars side by side under one boss) is kept apart by a small spread of heights.
 
 use super::anchor::{Anchor, FlexureEnd, Follow, SizeBy};
-use super::distance::separation;
+use super::distance::nearer_than;
 use super::mesh::Mesh;
 use super::parts::{Bore, Eye, FLOOR_MM, FlexureSolid, GeometryError, PartsInput};
 use super::riser::Near;
@@ -516,7 +516,7 @@ impl Builder<'_> {
 
     /// Whether a bar would run into a flexure, its own ones included, or into another body's stub.
     pub(super) fn hits(&self, bar: &Slot) -> bool {
-        let hits = |s: &Slot| separation(bar, s).gap_mm < self.input.clearance_mm;
+        let hits = |s: &Slot| nearer_than(bar, s, self.input.clearance_mm);
         self.input.flexures.iter().any(|f| {
             let own = |at_end: bool| self.index == if at_end { f.bodies.1 } else { f.bodies.0 };
             let free = |s: &Slot| {

@@ -31,36 +31,39 @@ const BLOCKED_MM: f64 = 1e4;
 pub fn connect(points: &[Vector3<f64>], blocked: impl Fn(&Vector3<f64>, &Vector3<f64>) -> bool) -> Net {
     let cost =
         |p: &Vector3<f64>, q: &Vector3<f64>| (p - q).norm() + if blocked(p, q) { BLOCKED_MM } else { 0.0 };
-    let chain = spanning_tree(points, &cost);
+    let costs: Vec<Vec<f64>> =
+        points.iter().enumerate().map(|(i, p)| points[..i].iter().map(|q| cost(p, q)).collect()).collect();
+    let between = |i: usize, j: usize| costs[i.max(j)][i.min(j)];
+    let chain = spanning_tree(points.len(), &between);
     if points.len() < 3 {
         return Net { hub: None, edges: chain };
     }
     let hub = median(points);
-    let star: f64 = points.iter().map(|p| cost(p, &hub)).sum();
-    let tree: f64 = chain.iter().map(|(i, j)| cost(&points[*i], &points[*j])).sum();
+    let tree: f64 = chain.iter().map(|(i, j)| between(*i, *j)).sum();
+    let enough = (1.0 - HUB_SAVES) * tree;
+    let plain: f64 = points.iter().map(|p| (p - hub).norm()).sum();
+    // What runs into something only makes it dearer, and is dear to find out.
+    let star = if plain < enough { points.iter().map(|p| cost(p, &hub)).sum() } else { plain };
     // A hub that falls on a node is that node: the chain then is the star.
     let apart = points.iter().map(|p| (p - hub).norm()).fold(f64::INFINITY, f64::min);
-    if star < (1.0 - HUB_SAVES) * tree && apart > 2.0 {
+    if star < enough && apart > 2.0 {
         let edges = (0..points.len()).map(|i| (i, points.len())).collect();
         return Net { hub: Some(hub), edges };
     }
     Net { hub: None, edges: chain }
 }
 
-fn spanning_tree(
-    points: &[Vector3<f64>],
-    cost: &impl Fn(&Vector3<f64>, &Vector3<f64>) -> f64,
-) -> Vec<(usize, usize)> {
+fn spanning_tree(count: usize, cost: &impl Fn(usize, usize) -> f64) -> Vec<(usize, usize)> {
     let mut edges = Vec::new();
-    let mut inside = vec![false; points.len()];
+    let mut inside = vec![false; count];
     if let Some(first) = inside.first_mut() {
         *first = true;
     }
-    for _ in 1..points.len() {
+    for _ in 1..count {
         let mut best: Option<(f64, usize, usize)> = None;
-        for (i, p) in points.iter().enumerate().filter(|(i, _)| inside[*i]) {
-            for (j, q) in points.iter().enumerate().filter(|(j, _)| !inside[*j]) {
-                let d = cost(p, q);
+        for i in (0..count).filter(|i| inside[*i]) {
+            for j in (0..count).filter(|j| !inside[*j]) {
+                let d = cost(i, j);
                 if best.is_none_or(|b| d < b.0) {
                     best = Some((d, i, j));
                 }

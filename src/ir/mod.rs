@@ -322,6 +322,11 @@ pub enum ObjectiveKind {
         /// Stress that counts as one; none: SI (1 Pa).
         scale_mpa: Option<f64>,
     },
+    /// Links and flexures nearer to each other than a gap (paper, eq. 7), in m² of their lengths.
+    Collision {
+        /// The gap.
+        gap_mm: f64,
+    },
     /// Soft maximum of the squared torque (paper, eq. 6, made monotone).
     Torque {
         /// Index into [`Design::drives`].

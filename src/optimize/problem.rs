@@ -7,6 +7,7 @@ use super::objectives::{self, Level, StateView, StatesSensitivity, Term};
 use crate::equilibrium::{
     Cycle, Equilibrium, Layout, Model, PointForce, SensitivityWorkspace, Solver, sweep,
 };
+use crate::geometry::{SkeletonCapsule, parts_input, plan_bodies, skeleton_capsules};
 use crate::ir::Design;
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -22,6 +23,8 @@ pub struct Problem<'d> {
     /// Largest sample of each soft maximum at the first point simulated: what its sharpness refers to.
     references: OnceLock<Vec<f64>>,
     edges: usize,
+    /// Whether a term sees the links' shapes.
+    needs_links: bool,
     simulations: AtomicUsize,
 }
 
@@ -39,6 +42,8 @@ pub struct Trial<'d> {
     pub terms: Vec<f64>,
     /// Of each term that is a soft maximum.
     levels: Vec<Option<Level>>,
+    /// The links' shapes; empty where no term sees them.
+    capsules: Vec<SkeletonCapsule>,
     /// Per counted state its equilibria under the load cases; empty without load cases.
     loaded: Vec<Vec<Equilibrium>>,
 }
@@ -93,6 +98,7 @@ impl<'d> Problem<'d> {
             cases,
             references: OnceLock::new(),
             edges,
+            needs_links: objectives::needs_links(design),
             simulations: AtomicUsize::new(0),
         }
     }
@@ -144,8 +150,10 @@ impl<'d> Problem<'d> {
         let model = Model::new(self.design, self.layout, &p, self.edges, true).ok()?;
         let cycle = sweep(&model).ok()?;
         let loaded = self.load(&model, &cycle)?;
-        let views: Vec<StateView> =
-            (0..self.layout.counted_states()).map(|s| self.view(&model, &cycle, &loaded, s)).collect();
+        let capsules = self.links(&model, p.len())?;
+        let views: Vec<StateView> = (0..self.layout.counted_states())
+            .map(|s| self.view(&model, &cycle, &loaded, &capsules, s))
+            .collect();
         let references = self.references.get_or_init(|| {
             let largest = |o: &Term| match o {
                 Term::Sum(_) => 0.0,
@@ -171,7 +179,16 @@ impl<'d> Problem<'d> {
         drop(views);
         terms.push(guards::cost(&model));
         let cost: f64 = terms.iter().sum();
-        cost.is_finite().then(|| Trial { x: x.to_vec(), model, cycle, cost, terms, levels, loaded })
+        cost.is_finite().then(|| Trial { x: x.to_vec(), model, cycle, cost, terms, levels, capsules, loaded })
+    }
+
+    /// The links' shapes, where a term sees them; none where a link has none.
+    fn links(&self, model: &Model<'d>, parameters: usize) -> Option<Vec<SkeletonCapsule>> {
+        if !self.needs_links {
+            return Some(Vec::new());
+        }
+        let plans = plan_bodies(&parts_input(self.design, self.layout, model)).ok()?;
+        Some(skeleton_capsules(&plans, model, parameters))
     }
 
     /// Equilibria under the load cases; none where one cannot be found.
@@ -204,6 +221,7 @@ impl<'d> Problem<'d> {
         model: &'a Model<'d>,
         cycle: &'a Cycle,
         loaded: &'a [Vec<Equilibrium>],
+        capsules: &'a [SkeletonCapsule],
         state: usize,
     ) -> StateView<'a> {
         StateView {
@@ -212,6 +230,7 @@ impl<'d> Problem<'d> {
             loaded: loaded.get(state).map_or(&[], |l| l),
             state,
             share: objectives::STEPS_OF_WEIGHTS / self.layout.counted_states() as f64,
+            capsules,
         }
     }
 
@@ -223,10 +242,10 @@ impl<'d> Problem<'d> {
         let parts: Vec<Option<Vec<Normal>>> = (0..self.layout.counted_states())
             .into_par_iter()
             .map_init(
-                || SensitivityWorkspace::new(&trial.model),
+                || SensitivityWorkspace::new(&trial.model).with_centrelines(self.needs_links),
                 |workspace, s| {
                     let target = self.target(s);
-                    let view = self.view(&trial.model, &trial.cycle, &trial.loaded, s);
+                    let view = self.view(&trial.model, &trial.cycle, &trial.loaded, &trial.capsules, s);
                     let free = workspace.at(&trial.model, view.equilibrium, &target).ok()?;
                     let loaded = self
                         .cases

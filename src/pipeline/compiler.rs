@@ -110,6 +110,18 @@ impl Stages for Compiler {
         cancel: &AtomicBool,
     ) -> Result<Solved, Failed> {
         let (layout, _) = layout(design, start)?;
+        if let Some(term) =
+            design.objectives.iter().find(|o| matches!(o.kind, ObjectiveKind::Collision { .. }))
+        {
+            let asks = |d: Diagnostic| {
+                d.also(term.origin, "this term sees the printed form").help(
+                    "without `collision` and `export stl` the mechanism can be checked, simulated and solved",
+                )
+            };
+            solids::available(design)
+                .map_err(|found| found.into_iter().map(asks).collect::<Vec<Diagnostic>>())?;
+            solids::plannable(design, &layout, start, EDGES)?;
+        }
         let problem = Problem::new(design, &layout, EDGES);
         let names = problem.term_names();
         let told = |i: &optimize::Iteration| {

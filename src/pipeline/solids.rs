@@ -4,8 +4,8 @@ use super::stages::Failed;
 use crate::diagnostic::Diagnostic;
 use crate::equilibrium::{Cycle, Layout, Model};
 use crate::geometry::{
-    Carving, Cut, CycleGaps, Fusion, LeastGap, Member, MovedState, Parts, build_carved_parts, carve,
-    carved_cycle_gaps, flexure_solid, parts_input, plan_bodies,
+    Carving, Cut, CycleGaps, Fusion, GeometryError, LeastGap, Member, MovedState, Parts, build_carved_parts,
+    carve, carved_cycle_gaps, flexure_solid, parts_input, plan_bodies,
 };
 use crate::ir::{Design, ExportKind, Joint, JointKind};
 
@@ -21,10 +21,23 @@ pub fn build(
     states: &[MovedState],
 ) -> Result<(Parts, Vec<Diagnostic>), Failed> {
     let input = parts_input(design, layout, model);
-    let parts = build_carved_parts(&input, states)
-        .map_err(|e| vec![Diagnostic::error("E0630", format!("no solid comes out: {e}"), design.origin)])?;
+    let parts = build_carved_parts(&input, states).map_err(|e| no_solid(design, &e))?;
     let found = parts.fusions.iter().map(|f| fusion(design, f)).collect();
     Ok((parts, found))
+}
+
+/// Whether every body has something to be made of. A design without equilibrium is not judged here.
+///
+/// # Errors
+/// What is missing.
+pub fn plannable(design: &Design, layout: &Layout, values: &[f64], edges: usize) -> Result<(), Failed> {
+    let Ok(model) = Model::new(design, layout, values, edges, false) else { return Ok(()) };
+    let planned = plan_bodies(&parts_input(design, layout, &model));
+    planned.map(|_| ()).map_err(|e| no_solid(design, &e))
+}
+
+fn no_solid(design: &Design, error: &GeometryError) -> Failed {
+    vec![Diagnostic::error("E0630", format!("no solid comes out: {error}"), design.origin)]
 }
 
 /// Whether every conventional joint has a printable form.

@@ -2,6 +2,7 @@
 //!
 //! A term is a sum over the states ([`Objective`]) or a soft maximum over all of them ([`Sampled`]).
 
+mod collision;
 mod soft_maximum;
 mod stress;
 mod sway;
@@ -11,6 +12,7 @@ mod track;
 pub use soft_maximum::{Level, Sampled};
 
 use crate::equilibrium::{Equilibrium, Layout, Model, PointForce, Sensitivity};
+use crate::geometry::SkeletonCapsule;
 use crate::ir::{Design, ObjectiveKind};
 use crate::math::skew;
 use crate::optimize::Normal;
@@ -32,6 +34,8 @@ pub struct StateView<'a> {
     pub state: usize,
     /// Weight of this state in sums over the cycle: 60 / number of counted states.
     pub share: f64,
+    /// The links as capsules in the rest pose; empty unless a term asks for them ([`needs_links`]).
+    pub capsules: &'a [SkeletonCapsule],
 }
 
 /// Derivatives of a state's equilibria.
@@ -94,6 +98,9 @@ pub fn build(design: &Design, layout: &Layout) -> (Vec<Term>, Vec<Vec<PointForce
             ObjectiveKind::Stress { scale_mpa } => {
                 Term::Peak(Box::new(stress::StressPeak::new(*scale_mpa, o.weight)))
             }
+            ObjectiveKind::Collision { gap_mm } => {
+                Term::Sum(Box::new(collision::Collision::new(design, *gap_mm, o.weight)))
+            }
             ObjectiveKind::Torque { drive, reference_n_mm } => {
                 let name = &design.drives[*drive].name;
                 Term::Peak(Box::new(torque::Torque::new(name, *drive, *reference_n_mm, o.weight)))
@@ -101,6 +108,11 @@ pub fn build(design: &Design, layout: &Layout) -> (Vec<Term>, Vec<Vec<PointForce
         })
         .collect();
     (terms, cases)
+}
+
+/// Whether a term sees where links and flexures are, not only what moves.
+pub fn needs_links(design: &Design) -> bool {
+    design.objectives.iter().any(|o| matches!(o.kind, ObjectiveKind::Collision { .. }))
 }
 
 /// Derivatives of a body's point (rest coordinates) by the n design parameters, 3 × n; none on ground.
