@@ -56,7 +56,8 @@ impl Builder {
     fn body(&mut self, name: &str, ground: bool, layer: i32) -> usize {
         let id = self.0.bodies.len();
         let skeleton: Vec<NamedPoint> = Vec::new();
-        self.0.bodies.push(Body { name: name.into(), ground, skeleton, layer, origin: origin(1, id) });
+        let origin = origin(1, id);
+        self.0.bodies.push(Body { name: name.into(), ground, skeleton, layer, owner: None, origin });
         id
     }
 

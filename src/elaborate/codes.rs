@@ -53,7 +53,7 @@ codes! {
     MISSING "E0402" "a statement that every mechanism needs is missing";
     REPEATED "E0403" "a statement that may stand only once";
     NO_GROUND "E0404" "a mechanism without a ground body";
-    JOINT_BODIES "E0405" "a joint that does not connect two different bodies";
+    JOINT_BODIES "E0405" "bodies of a joint that are not different, or not those its flexure joins";
     WRONG_KIND "E0406" "a name of the wrong kind";
     TEMPLATE_KIND "E0407" "a template that does not replace this kind of joint";
     QUERY "E0408" "a requirement that does not compare a query with a quantity";

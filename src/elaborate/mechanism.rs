@@ -157,12 +157,13 @@ impl<'a> Evaluator<'a> {
                 joint: i,
                 statement: joint.origin,
                 bodies: &bodies,
+                layer: joint.layer,
                 kind: &text.kind.node,
                 shorter_link_mm,
                 layer_height_mm,
                 process,
             };
-            if let Ok(made) = self.template(scope, module, template, &site, rods)
+            if let Ok(made) = self.template(scope, module, template, &site, (rods, &mut s.bodies))
                 && let Some(joint) = s.joints.get_mut(i)
             {
                 joint.realization =

@@ -169,8 +169,8 @@ impl<'a> Evaluator<'a> {
                 sheet.requires.push(RequireText { left, op: op.node, right, at });
             }
             StatementKind::Export(list) => sheet.exports.extend(list),
-            StatementKind::Rod(_) => self.out.push(
-                Diagnostic::error(codes::MISPLACED, "a rod stands in a `flexure`, not in a mechanism", at)
+            StatementKind::Rod(_) | StatementKind::OwnBody { .. } => self.out.push(
+                Diagnostic::error(codes::MISPLACED, "this stands in a `flexure`, not in a mechanism", at)
                     .help("declare `flexure NAME replaces hinge { … }` and use it with `as NAME`"),
             ),
             StatementKind::Later { keyword } => {

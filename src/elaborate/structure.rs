@@ -18,7 +18,7 @@ const SQUARE: f64 = 1e-9;
 /// Farthest layer.
 const MAX_LAYER: f64 = 100.0;
 /// Most bodies, and most joints.
-const MAX_PARTS: usize = 256;
+pub(super) const MAX_PARTS: usize = 256;
 
 /// Bodies and joints with their names.
 #[derive(Default)]
@@ -113,6 +113,7 @@ impl<'a> Evaluator<'a> {
             ground: text.ground,
             skeleton,
             layer: layer.unwrap_or(0),
+            owner: None,
             origin: text.at,
         })
     }
@@ -195,7 +196,7 @@ impl<'a> Evaluator<'a> {
             }
         }
         if let Some(third) = text.bodies.get(2) {
-            ok = self.many(text, kind, third).and(ok);
+            ok = self.many(kind, third).and(ok);
         }
         let point = self.eval(&Env::fixed(scope), &text.point).and_then(|v| self.as_point(v, &text.point));
         let axes = self.axes(scope, text, kind, planar);
@@ -232,20 +233,13 @@ impl<'a> Evaluator<'a> {
         })
     }
 
-    /// Only a conventional hinge may join more than two bodies.
-    fn many(&mut self, text: &ast::Joint, kind: JointKind, third: &Ident) -> Outcome<()> {
+    /// Only a hinge may join more than two bodies.
+    fn many(&mut self, kind: JointKind, third: &Ident) -> Outcome<()> {
         if kind != JointKind::Hinge {
             let message = format!("a {} joint connects two bodies", kind.name());
             return self.fail(
                 Diagnostic::error(codes::JOINT_BODIES, message, third.at)
                     .help("write one joint for each pair of bodies"),
-            );
-        }
-        if text.template.is_some() {
-            let message = "a flexure between more than two bodies is not available yet";
-            return self.fail(
-                Diagnostic::error(codes::LATER_JOINT, message, third.at)
-                    .help("write one hinge for each pair of bodies, or leave out `as …`"),
             );
         }
         Ok(())

@@ -1,27 +1,17 @@
 //! The parts of the compliant model that do not depend on the design parameters: rest poses, end
 //! frames of the rods, constraints, drives, traces and their targets, all in rest world coordinates.
 
+use super::frames::{RodEndFrame, end_frames};
 use crate::ir::{BodyId, Design};
 use crate::kinematics::{Constraint, JointValue, Motion};
 use crate::math::Pose;
 use crate::rod::RodModel;
-use nalgebra::{Matrix3, Vector3};
-
-/// Orthonormal frame of a rod end in rest world coordinates: columns e1, e2, e3.
-#[derive(Clone, Debug)]
-pub struct RodEndFrame {
-    /// Body the end is clamped in.
-    pub body: BodyId,
-    /// The joint's physical point in the rest pose, mm.
-    pub origin: Vector3<f64>,
-    /// Columns e1, e2, e3.
-    pub axes: Matrix3<f64>,
-}
+use nalgebra::Vector3;
 
 /// A rigid body of the compliant model.
 #[derive(Clone, Debug)]
 pub struct LayoutBody {
-    /// Centre of its increments: centroid of its joint points at rest, mm.
+    /// Centre of its increments: centroid of its joint points at rest, of a flexure's own body the joint's, mm.
     pub center: Vector3<f64>,
     /// First of its six unknowns, none for ground.
     pub first_dof: Option<usize>,
@@ -95,7 +85,11 @@ impl Layout {
                 .filter(|(j, _)| j.bodies.contains(&i))
                 .map(|(_, p)| at_rest(i, p))
                 .collect();
-            let center = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
+            let center = match body.owner {
+                // Its rods lie round the joint.
+                Some(joint) => at_rest(i, &joint_points[joint]),
+                None => points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64,
+            };
             let first_dof = (!body.ground).then(|| {
                 next += 6;
                 next - 6
@@ -147,35 +141,7 @@ impl Layout {
             })
             .collect();
 
-        let rod_ends = design
-            .rods
-            .iter()
-            .map(|rod| {
-                let joint = &design.joints[rod.joint];
-                let drawn = joint_points[rod.joint];
-                [rod.from.body, rod.to.body].map(|body| {
-                    let origin = at_rest(body, &drawn);
-                    let e3 = rest[body].direction(&Vector3::from(joint.axis)).normalize();
-                    let aim = match joint.toward.iter().find(|(b, _)| *b == body) {
-                        Some((_, q)) => at_rest(body, &values.point(*q)),
-                        None => {
-                            let others: Vec<Vector3<f64>> = design
-                                .joints
-                                .iter()
-                                .enumerate()
-                                .filter(|(k, j)| *k != rod.joint && j.bodies.contains(&body))
-                                .map(|(k, _)| at_rest(body, &joint_points[k]))
-                                .collect();
-                            others.iter().sum::<Vector3<f64>>() / others.len().max(1) as f64
-                        }
-                    };
-                    let d = aim - origin;
-                    let e1 = (d - e3 * d.dot(&e3)).normalize();
-                    let e2 = e3.cross(&e1);
-                    RodEndFrame { body, origin, axes: Matrix3::from_columns(&[e1, e2, e3]) }
-                })
-            })
-            .collect();
+        let rod_ends = end_frames(design, motion, &values);
 
         // A typical arm: the mean distance of the joints from the centres of their bodies.
         let mut arms = (0.0, 0);

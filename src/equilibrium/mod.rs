@@ -5,6 +5,7 @@
 //! The rods are condensed one by one onto the links they join, so what is solved here is a small
 //! symmetric saddle-point system of link increments and multipliers.
 
+mod frames;
 mod layout;
 mod load;
 mod model;
@@ -13,7 +14,8 @@ mod saddle;
 mod sensitivity;
 mod sweep;
 
-pub use layout::{Layout, RodEndFrame};
+pub use frames::RodEndFrame;
+pub use layout::Layout;
 pub use load::PointForce;
 pub use model::{Model, ModelError, ModelRod, State};
 pub use newton::{Equilibrium, SolveError, Solver};

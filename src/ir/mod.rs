@@ -83,6 +83,10 @@ pub struct Body {
     pub skeleton: Vec<NamedPoint>,
     /// Layer along the stacking axis.
     pub layer: i32,
+    /// Of a body that a template brings along, the joint it belongs to: it is called `joint.body`, stands after the
+    /// text's bodies and has no skeleton. The conventional mechanism carries it with the joint's first body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub owner: Option<JointId>,
     /// Declaration.
     pub origin: Origin,
 }
@@ -201,15 +205,30 @@ pub struct Rod {
     pub from: RodEnd,
     /// End.
     pub to: RodEnd,
+    /// Its ends' e3 is the second axis of a universal joint.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub second_axis: bool,
     /// Cross-section.
     pub section: Section,
     /// Declaration in the template.
     pub origin: Origin,
 }
 
-/// One end of a rod, in the end frame of its body at the joint: e3 the joint axis, e1 from the joint
-/// point towards the centroid of the body's other joint points (or the `toward` point) normal to e3,
-/// e2 = e3 × e1, all in the rest pose. Origin: the joint's physical point (with its layer's offset).
+fn is_false(b: &bool) -> bool {
+    !b
+}
+
+/// One end of a rod, in the end frame of its body at the joint, in the rest pose. Let w be the way from the joint
+/// point to the centroid of the body's other joint points (or to the `toward` point). e2 = e3 × e1 always, and of a
+///
+/// - hinge: e3 the axis, e1 along w, normal to e3;
+/// - ball: e1 along w, e3 world z (x where w is parallel to it), normal to e1;
+/// - universal joint: e3 the first axis (or the second, [`Rod::second_axis`]), e1 normal to both on the side of w;
+/// - slider: e2 the axis, e1 along w, normal to e2, so that e3 lies across the motion; w is that of the joint's
+///   first body, whose frame serves every end.
+///
+/// An end in a body of the template's own takes the frame of the rod's other end (of the joint's first body where
+/// that is an own one too). Origin: the joint's physical point (with its layer's offset).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RodEnd {
     /// The body it is clamped in.

@@ -40,7 +40,7 @@ pub struct Mechanism<'d> {
     pub traces: Vec<(usize, Vector3<f64>)>,
     /// Characteristic length L, mm: root mean square distance of the joint points from the centres of their bodies.
     pub length: f64,
-    /// First scaled unknown of every body; none for ground.
+    /// First scaled unknown of every body; none for ground and for bodies of flexures.
     pub(super) column: Vec<Option<usize>>,
 }
 
@@ -106,8 +106,9 @@ impl<'d> Mechanism<'d> {
         let mut column = Vec::new();
         let mut next = 0;
         for body in &design.bodies {
-            column.push((!body.ground).then_some(next));
-            next += if body.ground { 0 } else { 6 };
+            let moves = !body.ground && body.owner.is_none();
+            column.push(moves.then_some(next));
+            next += if moves { 6 } else { 0 };
         }
         let (drawing, length) = centers(design, &joint_points, &traces);
         let values = joint_values;
@@ -141,6 +142,11 @@ impl<'d> Mechanism<'d> {
         self.traces.iter().map(|(body, point)| poses[*body].point(point)).collect()
     }
 
+    /// Puts the bodies that flexures bring along where the first body of their joint carries them.
+    pub(super) fn carry(&self, poses: &mut [Pose]) {
+        carry(self.design, poses);
+    }
+
     /// Value of every joint, rad (on the branch nearest `near`) or mm; zero for joints without one.
     pub fn joint_values(&self, poses: &[Pose], near: &[f64]) -> Vec<f64> {
         let value = |(value, near): (&Option<JointValue>, &f64)| value.map_or(0.0, |v| v.value(poses, *near));
@@ -165,14 +171,26 @@ fn centers(
             points.extend(traces.iter().filter(|t| t.0 == id).map(|t| t.1));
         }
         let center = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
-        if !body.ground {
+        if !body.ground && body.owner.is_none() {
             square += points.iter().map(|p| (p - center).norm_squared()).sum::<f64>();
             count += points.len();
         }
         poses.push(Pose::rest(center));
     }
+    carry(design, &mut poses);
     let length = (square / count.max(1) as f64).sqrt();
     (poses, if length > 0.0 { length } else { 1.0 })
+}
+
+fn carry(design: &Design, poses: &mut [Pose]) {
+    for (id, body) in design.bodies.iter().enumerate() {
+        let carrier = body.owner.and_then(|j| design.joints.get(j)?.bodies.first());
+        if let Some(pose) = carrier.and_then(|b| poses.get(*b)).copied()
+            && let Some(own) = poses.get_mut(id)
+        {
+            *own = pose;
+        }
+    }
 }
 
 /// Indices of a design may come from a file: nothing below may trip over them.
@@ -181,7 +199,7 @@ fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
     let joints = design.joints.iter().all(|j| j.bodies.len() > 1 && j.bodies.iter().all(body));
     let drives = design.drives.iter().all(|d| d.joint < design.joints.len());
     let traces = design.traces.iter().all(|t| body(&t.body));
-    let moving = design.bodies.iter().filter(|b| !b.ground).count();
+    let moving = design.bodies.iter().filter(|b| !b.ground && b.owner.is_none()).count();
     let steps = design.cycle.steps;
     let bounded = |d: &Drive| {
         let most = match d.unit {

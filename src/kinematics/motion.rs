@@ -141,7 +141,8 @@ pub fn solve_motion(design: &Design, p: &[f64]) -> Result<Motion, Vec<Diagnostic
     if turning.is_empty() { Ok(motion) } else { Err(turning) }
 }
 
-fn state(mechanism: &Mechanism, sample: Sample) -> State {
+fn state(mechanism: &Mechanism, mut sample: Sample) -> State {
+    mechanism.carry(&mut sample.poses);
     State {
         traces_mm: mechanism.trace_points(&sample.poses),
         drives: sample.drive,

@@ -90,7 +90,7 @@ pub struct Flexure {
     pub name: Ident,
     /// The joint kind it replaces, e.g. `hinge`.
     pub replaces: Ident,
-    /// `param`, `let` and `rod` statements in order.
+    /// `param`, `let`, `body` and `rod` statements in order.
     pub statements: Vec<Statement>,
     /// Doc comment.
     pub doc: String,
@@ -204,8 +204,15 @@ pub enum StatementKind {
     },
     /// `export A, B(c)`
     Export(Vec<Expr>),
-    /// `rod NAME { from a at … along … to b at … along … section … }` (templates only)
+    /// `rod NAME { [axis second] from a at … along … to b at … along … section … }` (templates only)
     Rod(Box<Rod>),
+    /// `body NAME`: a body that a template brings along (templates only)
+    OwnBody {
+        /// Name.
+        name: Ident,
+        /// Points written in braces: it has none.
+        points: Vec<Ident>,
+    },
     /// A statement of the target language that this version does not have yet: its keyword.
     Later {
         /// Keyword.
@@ -299,6 +306,8 @@ pub enum Compare {
 pub struct Rod {
     /// Name.
     pub name: Ident,
+    /// `axis second`: where it says so; true for the second axis.
+    pub second_axis: Option<At<bool>>,
     /// `from BODY at … along …`
     pub from: RodEnd,
     /// `to BODY at … along …`
@@ -310,7 +319,7 @@ pub struct Rod {
 /// One end of a rod.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RodEnd {
-    /// `a`, `b`, `c`: the joint's bodies in order.
+    /// `a`, `b`, `c`: the joint's bodies in order; or a body of the template's own.
     pub body: Ident,
     /// Position, e.g. a call of `cyl`.
     pub position: Expr,

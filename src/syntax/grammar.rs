@@ -132,6 +132,7 @@ fn words(rule: Rule) -> String {
         Rule::rod_from => "`from`",
         Rule::rod_to => "`to`",
         Rule::rod_section => "`section`",
+        Rule::rod_axis => "`axis`",
         other => {
             // Keyword rules are called after their keyword.
             let name = format!("{other:?}");
@@ -244,6 +245,8 @@ fn kind(rule: Rule) -> Kind {
         Rule::rod_from => Kind::RodFrom,
         Rule::rod_to => Kind::RodTo,
         Rule::rod_section => Kind::RodSection,
+        Rule::rod_axis => Kind::RodAxis,
+        Rule::st_own => Kind::OwnBody,
         Rule::st_later => Kind::Later,
         Rule::value => Kind::Value,
         Rule::free => Kind::Free,

@@ -69,6 +69,10 @@ impl Lower<'_> {
                 node.all(Kind::Artefact).filter_map(|n| n.parts().next()).map(|n| self.expr(n)).collect(),
             ),
             Kind::Rod => StatementKind::Rod(Box::new(self.rod(node)?)),
+            Kind::OwnBody => StatementKind::OwnBody {
+                name: self.ident(node)?,
+                points: node.first(Kind::Points).map(|n| self.idents(n)).unwrap_or_default(),
+            },
             Kind::Later => StatementKind::Later { keyword: self.named(node.first(Kind::Keyword)?) },
             _ => return None,
         })
@@ -199,10 +203,16 @@ impl Lower<'_> {
     fn rod(&mut self, node: &Node) -> Option<Rod> {
         Some(Rod {
             name: self.ident(node)?,
+            second_axis: node.first(Kind::RodAxis).map(|n| self.which_axis(n)),
             from: self.rod_end(node.first(Kind::RodFrom)?)?,
             to: self.rod_end(node.first(Kind::RodTo)?)?,
             section: self.value(node.first(Kind::RodSection)?)?,
         })
+    }
+
+    fn which_axis(&self, node: &Node) -> At<bool> {
+        let second = node.all(Kind::Keyword).any(|n| self.text(n) == "second");
+        At { node: second, at: self.origin(node) }
     }
 
     fn rod_end(&mut self, node: &Node) -> Option<RodEnd> {
@@ -219,13 +229,14 @@ impl Lower<'_> {
                 StatementKind::Param { .. } | StatementKind::Let { .. } => (true, ""),
                 StatementKind::Later { .. } | StatementKind::Broken { .. } => (true, ""),
                 StatementKind::Rod(_) => (!mechanism, "a rod belongs in a `flexure`"),
+                StatementKind::OwnBody { .. } => (!mechanism, "a flexure's own body belongs in a `flexure`"),
                 _ => (mechanism, "this statement belongs in a `mechanism`"),
             };
             if !fits {
                 let help = if mechanism {
-                    "a mechanism gets its rods from a joint's `as TEMPLATE`"
+                    "a mechanism gets these from a joint's `as TEMPLATE`"
                 } else {
-                    "a flexure holds `param`, `let` and `rod` statements"
+                    "a flexure holds `param`, `let`, `body` and `rod` statements"
                 };
                 self.report(Diagnostic::error("E0009", what, statement.at).help(help));
                 statement.kind = StatementKind::Broken { words: Vec::new() };

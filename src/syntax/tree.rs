@@ -79,6 +79,8 @@ pub enum Kind {
     RodFrom,
     RodTo,
     RodSection,
+    RodAxis,
+    OwnBody,
     Later,
     // items
     File,

@@ -28,9 +28,9 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
     "require",
     "export",
     "rod",
+    "body",
     "allow",
     "assert",
-    "body",
     "case",
     "fatigue",
     "for",
@@ -64,7 +64,7 @@ pub(super) fn starts_statement(line: &str) -> bool {
 }
 
 /// How many of [`STATEMENT_WORDS`], which begins with the common ones, help lists.
-pub(super) const COMMON_STATEMENTS: usize = 22;
+pub(super) const COMMON_STATEMENTS: usize = 23;
 
 /// Whether a keyword is a kind of joint.
 pub(super) fn is_joint_kind(word: &str) -> bool {
@@ -98,6 +98,7 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "field" => "NAME = VALUE",
         "require" => "require VALUE <= VALUE",
         "export" => "export NAME, …",
+        "body" => "body NAME",
         "rod" => "rod NAME { from a at … along … to b at … along … section … }",
         _ => return None,
     })

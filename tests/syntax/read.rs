@@ -145,7 +145,7 @@ fn statements_of_the_whole_language_are_known_by_their_keyword() {
         mirror left = right across yz sharing a, b
         mount xl320 on a at S
         string cable: a at C1 to palm via C2
-        body ring {
+        variant ring {
             param x = 1
         }
         assert x < 2 \"message { not closed\"
@@ -177,7 +177,7 @@ fn statements_of_the_whole_language_are_known_by_their_keyword() {
             "mirror",
             "mount",
             "string",
-            "body",
+            "variant",
             "assert",
             "2 keys Some(\"xl320\") true",
             "drum",
