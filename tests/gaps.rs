@@ -54,17 +54,36 @@ fn the_solved_example_keeps_its_clearance() {
     }
 }
 
-/// The unsolved start bends a leaf into its own link: that is told with state and place.
+/// The unsolved start bends a leaf into its own link: the link is carved, and what is measured keeps the clearance.
 #[test]
-fn a_leaf_that_rubs_against_its_own_link_is_told() {
+fn a_link_makes_way_for_its_own_leaf() {
     let design = example();
     let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
     let simulation = Compiler::default().simulate(&design, &start).unwrap();
+    assert!(least(&simulation) >= design.process.clearance_mm, "{}", least(&simulation));
+    let rubs = |d: &&flexura::diagnostic::Diagnostic| ["W0636", "W0637"].contains(&d.code.as_str());
+    assert_eq!(simulation.diagnostics.iter().filter(rubs).count(), 0, "{:?}", simulation.diagnostics);
+}
+
+/// Where too little would be left of it, the link stays as it is: that is told with joint and link, and that the leaf
+/// rubs with state and place.
+#[test]
+fn a_leaf_that_rubs_against_its_own_link_is_told() {
+    let mut design = example();
+    design.process.least_wall_mm = 2.5;
+    let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
+    let simulation = Compiler::default().simulate(&design, &start).unwrap();
     assert!(least(&simulation) < 0.0);
-    let found: Vec<_> = simulation.diagnostics.iter().filter(|d| d.code == "W0636").collect();
-    assert!(!found.is_empty());
-    for d in found {
+    let of = |code: &str| simulation.diagnostics.iter().filter(|d| d.code == code).collect::<Vec<_>>();
+    assert!(!of("W0636").is_empty());
+    for d in of("W0636") {
         assert!(!d.is_error() && d.message.contains("rubs against"), "{}", d.message);
         assert!(d.labels[0].text.contains("at state") && d.labels[0].text.contains("overlap by"), "{d:?}");
+    }
+    let left = of("W0637");
+    assert!(!left.is_empty());
+    for d in left {
+        assert!(!d.is_error() && d.message.contains("cannot be carved"), "{}", d.message);
+        assert!(d.labels[0].text.contains("mm") && d.labels.len() == 2, "{d:?}");
     }
 }

@@ -216,7 +216,9 @@ fn units_of_the_columns_follow_the_drives() {
         let told: Vec<String> = out.diagnostics.iter().map(|d| format!("{} {}", d.code, d.message)).collect();
         (flexura::emit::csv::columns(&simulation.unwrap().motion), told)
     };
-    let (columns, told) = names(&hand());
+    let (columns, mut told) = names(&hand());
+    // All links lie in one layer there: as printed bodies they meet.
+    told.retain(|t| !t.starts_with("W0635") && !t.starts_with("W0636"));
     assert!(
         columns.contains(&"drive.guide_mm".into()) && columns.contains(&"force.guide_n".into()),
         "{columns:?}"

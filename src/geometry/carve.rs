@@ -19,10 +19,10 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Step of the grid that holds what a flexure sweeps, mm.
-const STEP_MM: f64 = 0.6;
+const STEP_MM: f64 = 0.5;
 /// Taken out beyond the clearance, mm: covers the facets of the grid, and the scallops between two shapes that are
 /// [`MOVE_MM`] apart.
-const MARGIN_MM: f64 = 0.12;
+const MARGIN_MM: f64 = 0.15;
 /// A flexure moves by this at most between two shapes that are taken out, mm.
 const MOVE_MM: f64 = 0.5;
 /// Shapes between two states at most.
@@ -31,6 +31,9 @@ const MOST_SHAPES: usize = 12;
 const BEYOND_MM: f64 = 1.0;
 /// Points on a flexure, from which distances to a carved link are taken, are this far apart at most, mm.
 const SAMPLE_MM: f64 = 0.5;
+
+/// Added to that root for the bend beside it, mm.
+const BACK_MM: f64 = 0.2;
 
 /// What became of a link that a flexure attached to it would hit.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,7 +49,7 @@ pub struct Cut {
     /// State of the cycle in which it is; none: the rest pose.
     pub state: Option<usize>,
     /// The least wall of the link on the way between its ends, with everything taken out that was to be taken out;
-    /// none: it would be cut apart.
+    /// none: it would be cut apart. Walls beside a cut are told apart up to about 2 mm.
     pub wall_mm: Option<f64>,
     /// Whether the link was carved.
     pub made: bool,
@@ -317,7 +320,7 @@ impl<'a> CarvedLink<'a> {
     }
 
     /// Least distance of a bent flexure from the link, mm, with its place in the link's rest pose, if it is below
-    /// `bound`. Left out is the root: within twice the clearance of the attachment the stub itself is nearer.
+    /// `bound`. Left out is the root, where the stub itself is nearer.
     pub(super) fn gap(
         &self,
         flexure: &FlexureSolid,
@@ -329,9 +332,10 @@ impl<'a> CarvedLink<'a> {
         let mut best = None;
         let mut bound = bound;
         let mut near = Vec::new();
-        let root = ROOT_MM.max(2.0 * clearance_mm);
         let shape = seen_from(flexure, pose);
-        for (_, s) in from_root(&shape, body).iter().filter(|(way, _)| *way >= root) {
+        // A slot's round end reaches back towards the stub's nose by half its thickness.
+        let root = |s: &Slot| ROOT_MM.max(clearance_mm + s.round_mm + BACK_MM);
+        for (_, s) in from_root(&shape, body).iter().filter(|(way, s)| *way >= root(s)) {
             let along = ((s.end - s.start).norm() / SAMPLE_MM).ceil().max(1.0);
             let across = (2.0 * s.half_height_mm / SAMPLE_MM).ceil();
             for i in 0..=along as usize {

@@ -61,7 +61,7 @@ pub fn cycle_gaps(
 }
 
 /// The same where links were carved: between such a link and the flexure it made way for the gap is measured on the
-/// carved solid, beyond twice the clearance from the attachment.
+/// carved solid, from where on its own stub is farther than the clearance.
 pub fn carved_cycle_gaps(
     plans: &[BodyPlan],
     states: &[MovedState],

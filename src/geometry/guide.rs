@@ -84,7 +84,7 @@ impl Builder<'_> {
         let role = Role::Guide(guide.joint);
         let radius = self.stop_radius(in_space);
         if guide.sleeve {
-            for slot in self.sleeve(guide, -sizes.half, sizes.half) {
+            for slot in self.whole_sleeve(guide) {
                 self.push(role, slot);
             }
             let out = sizes.inner + NOT_THROUGH_MM + radius;
@@ -126,6 +126,12 @@ impl Builder<'_> {
         if is_node {
             self.node(*at, None, Anchor::Fixed);
         }
+    }
+
+    /// The four plates of a sleeve.
+    pub(super) fn whole_sleeve(&self, guide: &Guide) -> [Slot; 4] {
+        let half = self.guide_sizes().half;
+        self.sleeve(guide, -half, half)
     }
 
     /// The four plates of a sleeve between two places along its direction.

@@ -3,10 +3,9 @@
 //!
 //! | file | holds |
 //! | --- | --- |
-//! | `input` | a design and its rods as the input of all others |
+//! | `input`, `layers` | a design and its rods as the input of all others |
 //! | `parts` | the input, the grouping into printed parts, the build |
 //! | `link`, `skeleton` | a body as stubs, bosses, bars, eyes and risers |
-//! | `space` | a body whose joints point different ways |
 //! | `anchor`, `capsules` | how these follow the flexures; a body as capsules with derivatives by the design parameters |
 //! | `space`, `guide`, `riser` | a body whose joints point different ways; sliders; ways into other layers |
 //! | `carve`, `field`, `wall` | links that make way for their own flexures, and what is left of them |

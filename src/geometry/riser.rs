@@ -7,6 +7,7 @@
 
 use super::anchor::Anchor;
 use super::distance::separation;
+use super::gap::ROOT_MM;
 use super::link::{
     BAR_BELOW_MM, BOSS_BELOW_MM, Builder, ROUND_MM, Role, SAME_NODE_MM, SPREAD_MM, STUB_FREE_MM,
     STUB_RADIUS_MM, spread,
@@ -25,8 +26,6 @@ const DISTANCES: usize = 24;
 const DISTANCE_STEP_MM: f64 = 1.5;
 /// A straight way is given up only if something would really be hit, by this, mm: what it is compared with is not exact.
 const OVERLAP_MM: f64 = 0.2;
-/// Next to its attachment a flexure is as near to its own link as it must be, mm.
-const OWN_ROOT_MM: f64 = 2.0;
 
 /// Something that moves beside a body, where it is in one state.
 pub(super) struct Near {
@@ -88,7 +87,7 @@ impl Builder<'_> {
         let ends = [(flexure.bodies.0, false), (flexure.bodies.1, true)];
         let root = |p: &Vector3<f64>| {
             let own = ends.iter().filter(|(body, _)| *body == self.index);
-            own.clone().any(|(_, at_end)| (flexure.end_point(*at_end) - p).norm() < OWN_ROOT_MM)
+            own.clone().any(|(_, at_end)| (flexure.end_point(*at_end) - p).norm() < ROOT_MM)
         };
         let place = |p: &Vector3<f64>, u: f64| {
             let w = u * u * (3.0 - 2.0 * u);
@@ -107,7 +106,7 @@ impl Builder<'_> {
             .collect()
     }
 
-    /// Another body before it is planned: its eyes, the bars between those in its own layer, its stubs.
+    /// Another body before it is planned: its eyes, the bars between those in its own layer, its sleeves and stubs.
     fn rough(&self, index: usize, body: &BodySolid) -> Vec<Slot> {
         let mut slots = Vec::new();
         for (i, eye) in body.eyes.iter().enumerate() {
@@ -137,6 +136,9 @@ impl Builder<'_> {
                     slots.push(Slot::bar(ends.0, ends.1, axis, self.bar_radius(), half, ROUND_MM));
                 }
             }
+        }
+        for guide in body.guides.iter().filter(|g| g.sleeve) {
+            slots.extend(self.whole_sleeve(guide));
         }
         for flexure in &self.input.flexures {
             for (own, at_end) in [(flexure.bodies.0, false), (flexure.bodies.1, true)] {
