@@ -84,7 +84,9 @@ pub struct Evaluator<'a> {
     interned: HashMap<(u8, u64, u64), ExprId>,
     /// Nothing is driven: the conventional mechanism has no path.
     pub(super) undriven: bool,
-    /// Names of the joints that slide.
+    /// Names of the strings.
+    pub(super) cables: BTreeSet<String>,
+    /// Names of the joints that slide, and of the strings.
     pub(super) sliders: BTreeSet<String>,
     /// Values of all nodes at the start values of the free variables, and those start values.
     pub(super) starts: (Vec<f64>, Vec<f64>),
@@ -111,6 +113,7 @@ impl<'a> Evaluator<'a> {
             half_said: BTreeSet::new(),
             interned: HashMap::new(),
             undriven: false,
+            cables: BTreeSet::new(),
             sliders: BTreeSet::new(),
             starts: (Vec::new(), Vec::new()),
         }

@@ -55,6 +55,7 @@ impl<'a> Evaluator<'a> {
             None => self.missing(&sheet, m, "process", "`print on polyjet`"),
         };
         let mut s = self.structure(scope, &sheet, m.name.at);
+        let strings = self.strings(scope, &sheet, &mut s);
         let clearance = process.as_ref().map(|(_, p)| p.clearance_mm);
         let layers = self.layers(scope, &sheet, &s, clearance).ok();
         let mut rods = Vec::new();
@@ -108,6 +109,7 @@ impl<'a> Evaluator<'a> {
             joints: s.joints,
             rods,
             drives: drives?,
+            strings: strings.map(|()| s.strings).ok()?,
             loads: loads?,
             cycle: cycle?,
             traces,
@@ -270,6 +272,7 @@ fn geometry_of(
         out.extend(b.skeleton.iter().map(|p| (p.position, b.origin)));
     }
     out.extend(traces.iter().map(|t| (t.point, t.origin)));
+    out.extend(super::strings::points_of(s));
     out.extend(loads.iter().flatten().filter_map(super::loads::point_of));
     out
 }
@@ -298,6 +301,9 @@ fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
     }
     for t in &mut design.traces {
         t.point.iter_mut().for_each(&mut *f);
+    }
+    for c in &mut design.strings {
+        c.point.iter_mut().chain(c.via.iter_mut().flatten()).for_each(&mut *f);
     }
     for load in &mut design.loads {
         if let LoadKind::Force { point, .. } = &mut load.kind {

@@ -25,6 +25,7 @@ mod require;
 mod scope;
 mod settings;
 mod sheet;
+mod strings;
 mod structure;
 mod template;
 mod terms;

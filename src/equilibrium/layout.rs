@@ -2,8 +2,8 @@
 //! frames of the rods, constraints, drives, traces and their targets, all in rest world coordinates.
 
 use super::design_load::LayoutLoad;
-use crate::ir::{BodyId, Design};
-use crate::kinematics::{Constraint, JointValue, Motion};
+use crate::ir::{BodyId, Design, DriveOn};
+use crate::kinematics::{Constraint, JointValue, Motion, Pull};
 use crate::math::Pose;
 use crate::rod::RodModel;
 use nalgebra::{Matrix3, Vector3};
@@ -31,7 +31,7 @@ pub struct LayoutBody {
 /// A drive row of the compliant model.
 #[derive(Clone, Debug)]
 pub struct LayoutDrive {
-    /// Relative angle or way, zero in the rest pose.
+    /// Relative angle, way or shortening, zero in the rest pose.
     pub joint: JointValue,
     /// Drive value of the rest pose, rad or mm.
     pub rest: f64,
@@ -122,13 +122,24 @@ impl Layout {
             .drives
             .iter()
             .filter_map(|d| {
-                let joint = &design.joints[d.joint];
-                let pair = joint.pairs().next()?;
-                let axis = rest[pair[0]].direction(&Vector3::from(joint.axis));
-                let point = at_rest(pair[0], &joint_points[d.joint]);
+                let value = match d.on {
+                    DriveOn::Joint(id) => {
+                        let joint = &design.joints[id];
+                        let pair = joint.pairs().next()?;
+                        let axis = rest[pair[0]].direction(&Vector3::from(joint.axis));
+                        let point = at_rest(pair[0], &joint_points[id]);
+                        JointValue::new(joint.kind, pair, point, &axis)?
+                    }
+                    DriveOn::String(id) => {
+                        let c = &design.strings[id];
+                        let point_a = at_rest(c.from, &values.point(c.point));
+                        let point_b = at_rest(c.to, &values.point(*c.via.first()?));
+                        JointValue::Pull(Pull { a: c.from, b: c.to, point_a, point_b })
+                    }
+                };
                 let steps = design.cycle.steps;
                 Some(LayoutDrive {
-                    joint: JointValue::new(joint.kind, pair, point, &axis)?,
+                    joint: value,
                     rest: d.rest,
                     values: (0..=steps).map(|s| d.value(s as f64 / steps as f64)).collect(),
                 })

@@ -7,7 +7,7 @@ mod load;
 mod solution;
 
 pub use crate::diagnostic::Origin;
-pub use drive::{Drive, DriveUnit, Profile};
+pub use drive::{Cable, Drive, DriveOn, DriveUnit, Profile};
 use expr::{ExprGraph, ExprId};
 pub use load::{Load, LoadKind};
 use serde::{Deserialize, Serialize};
@@ -37,6 +37,9 @@ pub struct Design {
     pub rods: Vec<Rod>,
     /// Drives.
     pub drives: Vec<Drive>,
+    /// Strings.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub strings: Vec<Cable>,
     /// Loads from outside.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub loads: Vec<Load>,
@@ -334,6 +337,13 @@ pub enum ObjectiveKind {
         /// Torque that counts as one: the motor's stall torque, or the scale in the text.
         reference_n_mm: f64,
     },
+    /// The same for the force of a drive that slides.
+    Force {
+        /// Index into [`Design::drives`].
+        drive: usize,
+        /// Force that counts as one: where the motor stalls, or the scale in the text.
+        reference_n: f64,
+    },
 }
 
 /// `require QUERY <= BOUND`.
@@ -383,8 +393,10 @@ pub enum Quantity {
     Gap,
     /// Size of the drive's torque, N·mm. Index into [`Design::drives`].
     Torque(usize),
-    /// Size of a slider drive's force, N. Index into [`Design::drives`].
+    /// Size of a sliding drive's force, N. Index into [`Design::drives`].
     Force(usize),
+    /// Pull of a string, N, negative where it would have to push. Index into [`Design::drives`].
+    Tension(usize),
 }
 
 /// Material data; what the text does not state is absent.

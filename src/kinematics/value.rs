@@ -3,17 +3,20 @@
 
 use super::constraint::{Gradient, Hessian};
 use super::forms::{Along, Product, normals, unit_or_z};
+use super::pull::Pull;
 use crate::ir::{DriveUnit, JointKind};
 use crate::math::Pose;
 use nalgebra::Vector3;
 
-/// Value of a joint.
+/// Value of a joint or a string.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointValue {
     /// Of a hinge or a cylindrical joint, rad.
     Angle(HingeAngle),
     /// Of a slider, mm.
     Shift(Shift),
+    /// Of a string, mm.
+    Pull(Pull),
 }
 
 impl JointValue {
@@ -37,6 +40,7 @@ impl JointValue {
         match self {
             Self::Angle(angle) => [angle.a, angle.b],
             Self::Shift(shift) => [shift.a, shift.b],
+            Self::Pull(pull) => [pull.a, pull.b],
         }
     }
 
@@ -44,7 +48,7 @@ impl JointValue {
     pub fn unit(&self) -> DriveUnit {
         match self {
             Self::Angle(_) => DriveUnit::Rad,
-            Self::Shift(_) => DriveUnit::Mm,
+            Self::Shift(_) | Self::Pull(_) => DriveUnit::Mm,
         }
     }
 
@@ -53,6 +57,7 @@ impl JointValue {
         match self {
             Self::Angle(angle) => angle.value(poses, near),
             Self::Shift(shift) => shift.form(poses).value(),
+            Self::Pull(pull) => pull.value(poses),
         }
     }
 
@@ -61,6 +66,7 @@ impl JointValue {
         match self {
             Self::Angle(angle) => angle.gradient(poses),
             Self::Shift(shift) => shift.form(poses).gradient(),
+            Self::Pull(pull) => pull.gradient(poses),
         }
     }
 
@@ -69,6 +75,7 @@ impl JointValue {
         match self {
             Self::Angle(angle) => angle.hessian(poses),
             Self::Shift(shift) => shift.form(poses).hessian(),
+            Self::Pull(pull) => pull.hessian(poses),
         }
     }
 }

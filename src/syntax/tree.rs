@@ -79,6 +79,8 @@ pub enum Kind {
     RodFrom,
     RodTo,
     RodSection,
+    String,
+    Via,
     Load,
     Gravity,
     Moment,

@@ -29,6 +29,7 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
     "export",
     "rod",
     "load",
+    "string",
     "allow",
     "assert",
     "body",
@@ -45,7 +46,6 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
     "solid",
     "spring",
     "stop",
-    "string",
     "sweep",
     "target",
     "tolerance",
@@ -64,7 +64,7 @@ pub(super) fn starts_statement(line: &str) -> bool {
 }
 
 /// How many of [`STATEMENT_WORDS`], which begins with the common ones, help lists.
-pub(super) const COMMON_STATEMENTS: usize = 23;
+pub(super) const COMMON_STATEMENTS: usize = 24;
 
 /// Whether a keyword is a kind of joint.
 pub(super) fn is_joint_kind(word: &str) -> bool {
@@ -99,6 +99,7 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "require" => "require VALUE <= VALUE",
         "export" => "export NAME, …",
         "rod" => "rod NAME { from a at … along … to b at … along … section … }",
+        "string" => "string NAME: BODY at POINT to BODY via POINT",
         "load" => "load FORCE along DIRECTION on BODY at POINT",
         _ => return None,
     })

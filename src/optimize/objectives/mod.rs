@@ -95,8 +95,12 @@ pub fn build(design: &Design, layout: &Layout) -> (Vec<Term>, Vec<Vec<PointForce
                 Term::Peak(Box::new(stress::StressPeak::new(*scale_mpa, o.weight)))
             }
             ObjectiveKind::Torque { drive, reference_n_mm } => {
-                let name = &design.drives[*drive].name;
+                let name = format!("torque({})", design.drives[*drive].name);
                 Term::Peak(Box::new(torque::Torque::new(name, *drive, *reference_n_mm, o.weight)))
+            }
+            ObjectiveKind::Force { drive, reference_n } => {
+                let name = format!("force({})", design.drives[*drive].name);
+                Term::Peak(Box::new(torque::Torque::new(name, *drive, *reference_n, o.weight)))
             }
         })
         .collect();
