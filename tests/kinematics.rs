@@ -30,6 +30,7 @@ impl Builder {
             rods: Vec::new(),
             drives: Vec::new(),
             loads: Vec::new(),
+            strings: Vec::new(),
             cycle: Cycle { steps: 60, duration_s: 2.0, origin: origin(9, 0) },
             traces: Vec::new(),
             aims: Default::default(),
@@ -99,7 +100,8 @@ impl Builder {
         let id = self.0.drives.len();
         self.0.drives.push(Drive {
             name: self.0.joints[joint].name.clone(),
-            joint,
+            on: flexura::ir::DriveOn::Joint(joint),
+            drum_radius_mm: None,
             unit: DriveUnit::Rad,
             profile: Profile::Range { from: from_deg.to_radians(), to: to_deg.to_radians() },
             rest: rest_deg.to_radians(),

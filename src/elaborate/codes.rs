@@ -71,6 +71,8 @@ codes! {
     NONCONSERVATIVE "E0440" "a moment whose work would depend on the way";
     WEIGHTLESS "E0441" "gravity on a material that states no density";
     NO_TARGET "E0442" "the error of a trace without a target";
+    STRING "E0443" "a string that cannot pull";
+    DRUM "E0444" "a motor on something that slides without a drum, or a drum without need";
     TARGET "E0450" "a target that is no path";
     EMPHASIS "E0451" "an emphasis that is negative, or zero all over the cycle";
     LATER_STATEMENT "E0901" "a statement that is not available yet";

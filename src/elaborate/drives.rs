@@ -7,7 +7,7 @@ use super::sheet::{DriveText, Sheet};
 use super::structure::Structure;
 use crate::diagnostic::Diagnostic;
 use crate::ir::expr::ExprId;
-use crate::ir::{Drive, DriveUnit, JointKind, MotorInterface};
+use crate::ir::{Drive, DriveOn, DriveUnit, JointKind, MotorInterface};
 use crate::syntax::ast::{Expr, Ident};
 
 impl<'a> Evaluator<'a> {
@@ -48,11 +48,11 @@ impl<'a> Evaluator<'a> {
                 );
                 continue;
             }
-            let Ok(joint) = self.thing(scope, &s.joint_index, name, "joint") else {
+            let Ok(on) = self.driven(scope, s, name) else {
                 ok = Err(Failed);
                 continue;
             };
-            match out.iter_mut().find(|d| d.joint == joint) {
+            match out.iter_mut().find(|d| d.on == on) {
                 Some(drive) => match rest {
                     Ok((start, free)) => (drive.rest, drive.free_rest) = (start, free),
                     Err(Failed) => ok = Err(Failed),
@@ -108,8 +108,12 @@ impl<'a> Evaluator<'a> {
         s: &Structure<'a>,
         before: &[Drive],
     ) -> Outcome<Drive> {
-        let joint = self.thing(scope, &s.joint_index, text.joint, "joint");
-        let unit = match joint.as_ref().ok().and_then(|j| s.joints.get(*j)) {
+        let on = self.driven(scope, s, text.joint);
+        let joint = match on {
+            Ok(DriveOn::Joint(joint)) => s.joints.get(joint),
+            Ok(DriveOn::String(_)) | Err(Failed) => None,
+        };
+        let unit = match joint {
             Some(joint) => self.drive_unit(joint.kind, text.joint),
             None if self.sliders.contains(&text.joint.node) => Ok(DriveUnit::Mm),
             None => Ok(DriveUnit::Rad),
@@ -124,33 +128,40 @@ impl<'a> Evaluator<'a> {
                 self.record_named(module, name, "motor").and_then(|item| self.motor(item).map(Some))
             }
         };
-        let (joint, unit, profile, motor) = (joint?, unit?, profile?, motor?);
-        if let Some(first) = before.iter().find(|d| d.joint == joint) {
+        let drum = text.drum.map(|e| self.drum(scope, e)).transpose();
+        let (on, unit, profile, motor, drum_radius_mm) = (on?, unit?, profile?, motor?, drum?);
+        if let Some(first) = before.iter().find(|d| d.on == on) {
             return self.fail(
-                Diagnostic::error(
-                    codes::REPEATED,
-                    format!("joint `{}` is driven twice", text.joint.node),
-                    text.at,
-                )
-                .label("again here")
-                .also(first.origin, "first here"),
+                Diagnostic::error(codes::REPEATED, format!("`{}` is driven twice", text.joint.node), text.at)
+                    .label("again here")
+                    .also(first.origin, "first here"),
             );
         }
-        if let (DriveUnit::Mm, Some(name)) = (unit, text.motor) {
+        if let (DriveUnit::Mm, Some(name), None) = (unit, text.motor, text.drum) {
             return self.fail(
                 Diagnostic::error(
-                    codes::LATER_STATEMENT,
-                    "a motor for a joint that slides is not available yet",
+                    codes::DRUM,
+                    format!("`{}` slides: a motor moves it by a drum", text.joint.node),
                     name.at,
                 )
-                .help("leave out `with …`: the slider is then moved from outside"),
+                .help(format!("write `with {} drum 8 mm`, its diameter, or leave out `with …`", name.node)),
+            );
+        }
+        if let (DriveUnit::Rad, Some(drum)) = (unit, text.drum) {
+            return self.fail(
+                Diagnostic::error(
+                    codes::DRUM,
+                    format!("`{}` turns: it needs no drum", text.joint.node),
+                    drum.at,
+                )
+                .help("leave out `drum …`"),
             );
         }
         let range = motor.as_ref().and_then(|m| match m.interface {
             MotorInterface::Stepper { .. } => None,
             MotorInterface::Pwm { range_rad } | MotorInterface::Dynamixel { range_rad } => Some(range_rad),
         });
-        let span = super::profiles::span(&profile);
+        let span = super::profiles::span(&profile) / drum_radius_mm.unwrap_or(1.0);
         if let Some(range) = range
             && !text.continuous
             && span > range * (1.0 + 1e-9)
@@ -167,15 +178,33 @@ impl<'a> Evaluator<'a> {
         }
         Ok(Drive {
             name: text.joint.node.clone(),
-            joint,
+            on,
             unit,
             profile,
             rest: 0.0,
             free_rest: None,
             motor,
             continuous: text.continuous,
+            drum_radius_mm,
             origin: text.at,
         })
+    }
+
+    /// The joint or string of a name.
+    fn driven(&mut self, scope: usize, s: &Structure<'a>, name: &Ident) -> Outcome<DriveOn> {
+        if self.cables.contains(&name.node) {
+            return self.thing(scope, &s.string_index, name, "string").map(DriveOn::String);
+        }
+        self.thing(scope, &s.joint_index, name, "joint").map(DriveOn::Joint)
+    }
+
+    /// Radius of a drum, mm.
+    fn drum(&mut self, scope: usize, e: &'a Expr) -> Outcome<f64> {
+        let diameter = self.eval_fixed(scope, e, Dimension::LENGTH, "the drum's diameter")?;
+        if diameter <= 0.0 {
+            return self.fail(Diagnostic::error(codes::SIZE, "the drum's diameter must be positive", e.at));
+        }
+        Ok(diameter / 2.0)
     }
 
     /// What a drive of a joint of this kind is measured in.

@@ -86,7 +86,9 @@ pub struct Evaluator<'a> {
     pub(super) undriven: bool,
     /// Directions, outputs and targets of the mechanism.
     pub(super) aims: super::aims::AimNames,
-    /// Names of the joints that slide.
+    /// Names of the strings.
+    pub(super) cables: BTreeSet<String>,
+    /// Names of the joints that slide, and of the strings.
     pub(super) sliders: BTreeSet<String>,
     /// Values of all nodes at the start values of the free variables, and those start values.
     pub(super) starts: (Vec<f64>, Vec<f64>),
@@ -114,6 +116,7 @@ impl<'a> Evaluator<'a> {
             interned: HashMap::new(),
             undriven: false,
             aims: super::aims::AimNames::default(),
+            cables: BTreeSet::new(),
             sliders: BTreeSet::new(),
             starts: (Vec::new(), Vec::new()),
         }

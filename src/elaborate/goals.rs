@@ -115,14 +115,15 @@ impl<'a> Evaluator<'a> {
                 let slots = self.arguments(name, args, &["drive"], 1)?;
                 let drive = self.plain_name(slots.first().copied().flatten(), "drive")?;
                 let index = self.drive_named(scope, drive, drives)?;
-                if self.sliders.contains(&drive.node) {
+                let drum = texts.iter().any(|d| d.joint.node == drive.node && d.drum.is_some());
+                if self.sliders.contains(&drive.node) && !drum {
                     return self.fail(
                         Diagnostic::error(
                             codes::EXPORT,
-                            "code for a drive that slides is not available yet",
+                            "this drive slides, and no drum says how a motor turns for it",
                             drive.at,
                         )
-                        .help("only turning drives have sketches"),
+                        .help("write `drive … with nema17 drum 8 mm`"),
                     );
                 }
                 if texts.iter().any(|d| d.joint.node == drive.node && d.motor.is_none()) {

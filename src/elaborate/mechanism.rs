@@ -57,6 +57,7 @@ impl<'a> Evaluator<'a> {
             None => self.missing(&sheet, m, "process", "`print on polyjet`"),
         };
         let mut s = self.structure(scope, &sheet, m.name.at);
+        let strings = self.strings(scope, &sheet, &mut s);
         let clearance = process.as_ref().map(|(_, p)| p.clearance_mm);
         let layers = self.layers(scope, &sheet, &s, clearance).ok();
         let mut rods = Vec::new();
@@ -111,6 +112,7 @@ impl<'a> Evaluator<'a> {
             rods,
             model: model?,
             drives: drives?,
+            strings: strings.map(|()| s.strings).ok()?,
             loads: loads?,
             cycle: cycle?,
             traces,
@@ -267,6 +269,9 @@ fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
         t.point.iter_mut().for_each(&mut *f);
     }
     design.drives.iter_mut().filter_map(|d| d.free_rest.as_mut()).for_each(&mut *f);
+    for c in &mut design.strings {
+        c.point.iter_mut().chain(c.via.iter_mut().flatten()).for_each(&mut *f);
+    }
     for load in &mut design.loads {
         if let LoadKind::Force { point, .. } = &mut load.kind {
             point.iter_mut().for_each(&mut *f);

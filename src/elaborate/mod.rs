@@ -29,6 +29,7 @@ mod require;
 mod scope;
 mod settings;
 mod sheet;
+mod strings;
 mod structure;
 mod table;
 mod taper;

@@ -10,8 +10,8 @@ use crate::syntax::ast::{Argument, Compare, Expr, ExprKind, Ident};
 use std::collections::BTreeMap;
 
 const AGGREGATES: &[&str] = &["max", "min", "mean", "span", "at"];
-const LATER_QUANTITIES: &[&str] = &["tension", "buckling"];
-const QUANTITIES: &[&str] = &["error", "stress", "torque", "force", "gap", "angle"];
+const LATER_QUANTITIES: &[&str] = &["buckling"];
+const QUANTITIES: &[&str] = &["error", "stress", "torque", "force", "tension", "gap", "angle"];
 /// A query as written: `max(error(tip))`.
 struct Query<'a> {
     outer: Option<&'a Ident>,
@@ -175,6 +175,18 @@ impl<'a> Evaluator<'a> {
                 let index = self.drive_named(scope, drive, drives)?;
                 self.slides(drive, true)?;
                 Ok((Quantity::Force(index), Dimension::FORCE))
+            }
+            "tension" => {
+                let slots = self.arguments(name, args, &["string"], 1)?;
+                let string = self.plain_name(slots.first().copied().flatten(), "string")?;
+                let index = self.drive_named(scope, string, drives)?;
+                if !self.cables.contains(&string.node) {
+                    return self.fail(
+                        Diagnostic::error(codes::TYPE, format!("`{}` is no string", string.node), string.at)
+                            .help(format!("write `force({})` or `torque({})`", string.node, string.node)),
+                    );
+                }
+                Ok((Quantity::Tension(index), Dimension::FORCE))
             }
             later => self.later(codes::LATER_TERM, later, name.at),
         }

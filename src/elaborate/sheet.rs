@@ -21,6 +21,7 @@ pub struct DriveText<'a> {
     pub profile: &'a ast::Profile,
     pub motor: Option<&'a Ident>,
     pub continuous: bool,
+    pub drum: Option<&'a Expr>,
     pub at: Origin,
 }
 
@@ -51,6 +52,7 @@ pub struct Sheet<'a> {
     pub model: Option<(&'a Ident, Origin)>,
     pub cycle: Option<(&'a Expr, Option<&'a Expr>, Origin)>,
     pub drives: Vec<DriveText<'a>>,
+    pub strings: Vec<(&'a ast::Cable, Origin)>,
     pub loads: Vec<(&'a ast::Load, Origin)>,
     pub rests: Vec<(&'a Ident, &'a Expr, Origin)>,
     pub traces: Vec<TraceText<'a>>,
@@ -161,9 +163,14 @@ impl<'a> Evaluator<'a> {
                     sheet.cycle = Some((steps, over.as_ref(), at));
                 }
             }
-            StatementKind::Drive { joint, profile, motor, continuous } => {
+            StatementKind::Drive { joint, profile, motor, continuous, drum } => {
                 let (motor, continuous) = (motor.as_ref(), *continuous);
-                sheet.drives.push(DriveText { joint, profile, motor, continuous, at });
+                sheet.drives.push(DriveText { joint, profile, motor, continuous, drum: drum.as_ref(), at });
+            }
+            StatementKind::String(cable) => {
+                if self.name_thing(scope, &cable.name, "string") {
+                    sheet.strings.push((cable, at));
+                }
             }
             StatementKind::Load(load) => sheet.loads.push((load, at)),
             StatementKind::Rest { joint, value } => sheet.rests.push((joint, value, at)),

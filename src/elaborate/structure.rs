@@ -27,6 +27,8 @@ pub struct Structure<'a> {
     pub body_index: BTreeMap<String, usize>,
     pub joints: Vec<Joint>,
     pub joint_index: BTreeMap<String, usize>,
+    pub strings: Vec<crate::ir::Cable>,
+    pub string_index: BTreeMap<String, usize>,
     /// A body or joint was wrong: what seems to be missing may be there.
     pub incomplete: bool,
     /// The statement of each joint.

@@ -20,8 +20,8 @@ const NEWTON_METRE_N_MM: f64 = 1000.0;
 const SWAY_FORCE_N: f64 = 1.0;
 
 /// Objectives and queries of the target language that this version does not have.
-const LATER_TERMS: &[&str] = &["force", "gap", "buckling", "tension", "multistable", "mass"];
-const TERMS: &[&str] = &["track", "sway", "torque", "collision", "stress"];
+const LATER_TERMS: &[&str] = &["gap", "buckling", "tension", "multistable", "mass"];
+const TERMS: &[&str] = &["track", "sway", "torque", "force", "collision", "stress"];
 
 /// What terms may name.
 pub(super) struct Named<'n> {
@@ -52,6 +52,7 @@ impl<'a> Evaluator<'a> {
         let (kind, default) = match function.node.as_str() {
             "track" => self.track(scope, function, arguments, named)?,
             "sway" => self.sway(scope, function, arguments, named)?,
+            "force" => self.drive_force(scope, function, arguments, named)?,
             "torque" => self.torque(scope, function, arguments, named)?,
             "collision" => self.collision(scope, function, arguments)?,
             "stress" => self.stress(scope, function, arguments)?,
@@ -133,6 +134,7 @@ impl<'a> Evaluator<'a> {
         let slots = self.arguments(function, arguments, &["drive", "scale", "form"], 1)?;
         let name = self.plain_name(slots.first().copied().flatten(), "drive")?;
         let drive = self.drive_named(scope, name, named.driven);
+        self.slides(name, false)?;
         let scale = slots.get(1).copied().flatten();
         let scale = self.positive(scope, scale, Dimension::TORQUE, "a scale")?;
         let drive = drive?;
@@ -173,6 +175,38 @@ impl<'a> Evaluator<'a> {
             .positive(scope, slots.first().copied().flatten(), Dimension::LENGTH, "a gap")?
             .ok_or(Failed)?;
         Ok((ObjectiveKind::Collision { gap_mm }, COLLISION_WEIGHT))
+    }
+
+    fn drive_force(
+        &mut self,
+        scope: usize,
+        function: &'a Ident,
+        arguments: &'a [Argument],
+        named: &Named,
+    ) -> Outcome<(ObjectiveKind, f64)> {
+        let slots = self.arguments(function, arguments, &["drive", "scale"], 1)?;
+        let name = self.plain_name(slots.first().copied().flatten(), "drive")?;
+        let drive = self.drive_named(scope, name, named.driven);
+        self.slides(name, true)?;
+        let scale = slots.get(1).copied().flatten();
+        let scale = self.positive(scope, scale, Dimension::FORCE, "a scale")?;
+        let drive = drive?;
+        if let Some(reference_n) = scale {
+            return Ok((ObjectiveKind::Force { drive, reference_n }, 1.0));
+        }
+        let Some(stated) = named.drives.and_then(|d| d.get(drive)) else { return Err(Failed) };
+        match stated.stall_force_n() {
+            Some(reference_n) => Ok((ObjectiveKind::Force { drive, reference_n }, TORQUE_WEIGHT)),
+            None => self.fail(
+                Diagnostic::error(codes::ARGUMENTS, "which force is large is not known here", function.at)
+                    .label(format!("`{}` has no motor to compare with", name.node))
+                    .also(stated.origin, "this drive")
+                    .help(format!(
+                        "write `drive … with xl320 drum 8 mm`, or `force({}, scale = 10 N)`",
+                        name.node
+                    )),
+            ),
+        }
     }
 
     fn stress(

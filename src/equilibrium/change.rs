@@ -228,11 +228,24 @@ impl Making<'_> {
     }
 
     fn drives(&self) -> Vec<DriveChange> {
-        let own = self.design.drives.iter().zip(&self.layout.drives).zip(&self.change.rest_drives);
-        own.map(|((drive, laid), rest)| {
-            let first = laid.joint.bodies()[0];
-            let point = self.carried(first, &self.change.joint_points[drive.joint]);
-            let reference = ReferenceChange { twists: [self.change.rest[first]; 2], points: [point; 2] };
+        let change = &self.change;
+        let own = self.design.drives.iter().zip(&self.layout.drives).zip(&change.rest_drives);
+        let own = own.zip(&change.string_points);
+        own.map(|(((drive, laid), rest), strings)| {
+            let [first, second] = laid.joint.bodies();
+            let reference = match drive.joint() {
+                Some(joint) => {
+                    let point = self.carried(first, &self.change.joint_points[joint]);
+                    ReferenceChange { twists: [self.change.rest[first]; 2], points: [point; 2] }
+                }
+                None => {
+                    let [a, b] = strings;
+                    ReferenceChange {
+                        twists: [first, second].map(|b| self.change.rest[b]),
+                        points: [self.carried(first, a), self.carried(second, b)],
+                    }
+                }
+            };
             DriveChange { rest: *rest, reference }
         })
         .collect()

@@ -5,8 +5,8 @@ use super::change::{LayoutChange, layout_changes};
 use super::design_load::LayoutLoad;
 use super::frames::{RodEndFrame, end_frames};
 use super::target::{LayoutDirection, LayoutTrace};
-use crate::ir::{BodyId, Design, RodModel};
-use crate::kinematics::{Constraint, JointValue, Motion};
+use crate::ir::{BodyId, Design, DriveOn, RodModel};
+use crate::kinematics::{Constraint, JointValue, Motion, Pull};
 use crate::math::Pose;
 use nalgebra::Vector3;
 use std::borrow::Cow;
@@ -23,7 +23,7 @@ pub struct LayoutBody {
 /// A drive row of the compliant model.
 #[derive(Clone, Debug)]
 pub struct LayoutDrive {
-    /// Relative angle or way, zero in the rest pose.
+    /// Relative angle, way or shortening, zero in the rest pose.
     pub joint: JointValue,
     /// Drive value of the rest pose, rad or mm.
     pub rest: f64,
@@ -115,12 +115,22 @@ impl Layout {
             .drives
             .iter()
             .filter_map(|d| {
-                let joint = &design.joints[d.joint];
-                let pair = joint.pairs().next()?;
-                let (axis, drawn) = (Vector3::from(joint.axis), joint_points[d.joint]);
+                let value = match d.on {
+                    DriveOn::Joint(id) => {
+                        let joint = &design.joints[id];
+                        let axis = Vector3::from(joint.axis);
+                        JointValue::new(joint.kind, joint.pairs().next()?, joint_points[id], &axis)?
+                    }
+                    DriveOn::String(id) => {
+                        let c = &design.strings[id];
+                        let (point_a, point_b) = (values.point(c.point), values.point(*c.via.first()?));
+                        JointValue::Pull(Pull { a: c.from, b: c.to, point_a, point_b })
+                    }
+                };
                 let steps = design.cycle.steps;
+                let carriers = value.bodies().map(|b| &rest[b]);
                 Some(LayoutDrive {
-                    joint: JointValue::new(joint.kind, pair, drawn, &axis)?.carried(&rest[pair[0]]),
+                    joint: value.carried(carriers),
                     rest: d.free_rest.map_or(d.rest, |id| values.value(id)),
                     values: (0..=steps).map(|s| d.value(s as f64 / steps as f64)).collect(),
                 })

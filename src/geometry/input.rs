@@ -119,7 +119,7 @@ fn slot(design: &Design, joint: &Joint, body: BodyId) -> (usize, usize) {
 
 fn bore(design: &Design, index: JointId, joint: &Joint, body: BodyId) -> Bore {
     let clearance = design.process.clearance_mm;
-    let motor = design.drives.iter().find(|d| d.joint == index).and_then(|d| d.motor.as_ref());
+    let motor = design.drives.iter().find(|d| d.joint() == Some(index)).and_then(|d| d.motor.as_ref());
     if let Some(shaft) = motor.and_then(|m| m.shaft_diameter_mm) {
         let turned = joint.bodies.get(1) == Some(&body);
         let room = if turned { SHAFT_FIT * clearance } else { 2.0 * clearance };

@@ -2,16 +2,17 @@
 //! [`Drive::unit`] says, relative to the drawing pose.
 
 use super::expr::{ExprGraph, ExprId};
-use super::{JointId, Motor, Origin};
+use super::{BodyId, ExprPoint, JointId, Motor, Origin};
 use serde::{Deserialize, Serialize};
 
-/// A driven joint.
+/// A driven joint or string.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Drive {
-    /// Name: the joint's.
+    /// Name: the joint's or the string's.
     pub name: String,
-    /// The driven joint.
-    pub joint: JointId,
+    /// What it moves.
+    #[serde(flatten)]
+    pub on: DriveOn,
     /// Unit of all its values.
     pub unit: DriveUnit,
     /// Value over the cycle, relative to the drawing pose, rad or mm.
@@ -25,11 +26,64 @@ pub struct Drive {
     pub motor: Option<Motor>,
     /// The motor turns continuously.
     pub continuous: bool,
+    /// Radius of the drum by which the motor moves something that slides, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drum_radius_mm: Option<f64>,
+    /// Declaration.
+    pub origin: Origin,
+}
+
+/// What a drive moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DriveOn {
+    /// A joint by its angle or way.
+    Joint(JointId),
+    /// A string by its shortening: index into `Design::strings`.
+    String(usize),
+}
+
+/// A string from a point of one body through points of another. It only pulls; its value is by how much it is shorter
+/// than as drawn.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cable {
+    /// Name.
+    pub name: String,
+    /// The body it is tied to.
+    pub from: BodyId,
+    /// Where, in the drawing pose.
+    pub point: ExprPoint,
+    /// The body that guides it: what lies behind the first point has a length of its own.
+    pub to: BodyId,
+    /// Points of that body, in the drawing pose; at least one.
+    pub via: Vec<ExprPoint>,
     /// Declaration.
     pub origin: Origin,
 }
 
 impl Drive {
+    /// The driven joint, if it is one.
+    pub fn joint(&self) -> Option<JointId> {
+        match self.on {
+            DriveOn::Joint(joint) => Some(joint),
+            DriveOn::String(_) => None,
+        }
+    }
+
+    /// Force of a sliding drive at which its motor stalls, N; none without a motor on a drum.
+    pub fn stall_force_n(&self) -> Option<f64> {
+        Some(self.motor.as_ref()?.stall_n_mm / self.drum_radius_mm?)
+    }
+
+    /// Turn of the motor from the rest value `rest` at t in 0..1, rad; none for what slides without a drum.
+    pub fn motor_angle_rad(&self, t: f64, rest: f64) -> Option<f64> {
+        let way = self.value(t) - rest;
+        match self.unit {
+            DriveUnit::Rad => Some(way),
+            DriveUnit::Mm => Some(way / self.drum_radius_mm?),
+        }
+    }
+
     /// Value at t in 0..1, rad or mm.
     pub fn value(&self, t: f64) -> f64 {
         self.profile.value(t)

@@ -10,7 +10,7 @@ mod solution;
 
 pub use crate::diagnostic::Origin;
 pub use aim::{Aims, BodyAngle, Direction, Target, TargetOf, TargetPath};
-pub use drive::{Drive, DriveUnit, Profile};
+pub use drive::{Cable, Drive, DriveOn, DriveUnit, Profile};
 use expr::{ExprGraph, ExprId};
 pub use load::{Load, LoadKind};
 pub use model::RodModel;
@@ -44,6 +44,9 @@ pub struct Design {
     pub model: RodModel,
     /// Drives.
     pub drives: Vec<Drive>,
+    /// Strings.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub strings: Vec<Cable>,
     /// Loads from outside.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub loads: Vec<Load>,
@@ -79,6 +82,7 @@ impl Design {
             roots.extend(joint.toward.iter().flat_map(|(_, q)| q));
         }
         roots.extend(self.traces.iter().flat_map(|t| t.point));
+        roots.extend(self.strings.iter().flat_map(|c| c.via.iter().flatten().chain(&c.point)));
         roots.extend(self.drives.iter().filter_map(|d| d.free_rest));
         self.exprs.free_variables(&roots).into_iter().collect()
     }
@@ -428,6 +432,13 @@ pub enum ObjectiveKind {
         /// Stress that counts as one; none: SI (1 Pa).
         scale_mpa: Option<f64>,
     },
+    /// As `Torque`, for the force of a drive that slides.
+    Force {
+        /// Index into [`Design::drives`].
+        drive: usize,
+        /// Force that counts as one: where the motor stalls, or the scale in the text.
+        reference_n: f64,
+    },
 }
 
 /// `require QUERY <= BOUND`.
@@ -477,7 +488,7 @@ pub enum Quantity {
     Gap,
     /// Size of the drive's torque, N·mm. Index into [`Design::drives`].
     Torque(usize),
-    /// Size of a slider drive's force, N. Index into [`Design::drives`].
+    /// Size of a sliding drive's force, N. Index into [`Design::drives`].
     Force(usize),
     /// Distance of a trace from the nearest place of its target, mm. Index into [`Design::traces`].
     ErrorClosest(usize),
@@ -485,6 +496,8 @@ pub enum Quantity {
     AimError(usize),
     /// How far a body has turned, rad. Index into [`Aims::angles`].
     Angle(usize),
+    /// Pull of a string, N, negative where it would have to push. Index into [`Design::drives`].
+    Tension(usize),
 }
 
 /// Material data; what the text does not state is absent.

@@ -130,6 +130,11 @@ impl Constraint {
 impl JointValue {
     /// Derivatives of the value and of its gradient at fixed poses when the reference geometry moves.
     pub fn reference_derivative(&self, poses: &[Pose], change: &ReferenceChange) -> (f64, Gradient) {
+        if let Self::Pull(pull) = self {
+            let [a, b] = [pull.point_a, pull.point_b];
+            let rates = [change.twists[0].at(&a) + change.points[0], change.twists[1].at(&b) + change.points[1]];
+            return pull.point_derivative(poses, rates);
+        }
         let increments = change.increments(self.bodies().map(|b| &poses[b]));
         let gradient = self.gradient(poses);
         let mut value = gradient.dot(&increments);
@@ -155,6 +160,7 @@ impl JointValue {
 mod tests {
     use super::*;
     use crate::ir::JointKind;
+    use crate::kinematics::Pull;
     use crate::math::exp_so3;
     use proptest::prelude::*;
 
@@ -225,7 +231,8 @@ mod tests {
                 let change = ReferenceChange { twists: [twists[0]; 2], points: [dp; 2] };
                 let value = |h: f64| {
                     let drawn = JointValue::new(kind, [0, 1], p + dp * h, &axis)?;
-                    Some(drawn.carried(&reference(&twists[0], h)))
+                    let rest = reference(&twists[0], h);
+                    Some(drawn.carried([&rest; 2]))
                 };
                 let Some(here) = value(0.0) else { continue };
                 let near = here.value(&poses, 0.0);
@@ -238,6 +245,20 @@ mod tests {
                 prop_assert!((slope - by_value).abs() < 1e-6 * (1.0 + slope.abs()), "{kind:?} {slope} {by_value}");
                 prop_assert!((gradient - by_gradient).norm() < 1e-6 * (1.0 + gradient.norm()), "{kind:?}");
             }
+            // A string has a point in either body.
+            let change = ReferenceChange { twists, points: [dp, l] };
+            let pull = |h: f64| {
+                let (point_a, point_b) = (p + dp * h, p + axis * 20.0 + l * h);
+                let drawn = JointValue::Pull(Pull { a: 0, b: 1, point_a, point_b });
+                drawn.carried([&reference(&twists[0], h), &reference(&twists[1], h)])
+            };
+            let (slope, gradient) = pull(0.0).reference_derivative(&poses, &change);
+            let points = pull(0.0).gradient(&poses);
+            prop_assume!(points.norm().is_finite());
+            let by_value = difference(step, |h| pull(h).value(&poses, 0.0));
+            let by_gradient = difference(step, |h| pull(h).gradient(&poses));
+            prop_assert!((slope - by_value).abs() < 1e-6 * (1.0 + slope.abs()), "{slope} {by_value}");
+            prop_assert!((gradient - by_gradient).norm() < 1e-6 * (1.0 + gradient.norm()), "{gradient} {by_gradient}");
         }
     }
 }

@@ -9,7 +9,7 @@ use super::mechanism::Mechanism;
 use super::motion::Motion;
 use super::path::DEAD_POINT;
 use super::value::JointValue;
-use crate::ir::Design;
+use crate::ir::{Design, Drive, DriveOn};
 use crate::ir::expr::Evaluated;
 use crate::math::Pose;
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -23,6 +23,8 @@ pub struct MotionChange {
     pub rest_drives: Vec<f64>,
     /// Of the joints' points as drawn, mm.
     pub joint_points: Vec<Vector3<f64>>,
+    /// Of the two ends of each drive's string as drawn, mm; zero for other drives.
+    pub string_points: Vec<[Vector3<f64>; 2]>,
     /// Of the traced points as drawn, mm.
     pub trace_points: Vec<Vector3<f64>>,
     /// Of every body's rest pose: where what it carries moves, in rest world coordinates.
@@ -48,7 +50,7 @@ pub fn motion_changes(design: &Design, motion: &Motion, p: &[f64]) -> Option<Vec
     let at_rest = Follower::new(&mechanism, &motion.rest.poses, &motion.rest.drives)?;
     let spins = Spins::new(&mechanism, &at_rest, &values)?;
     for change in &mut changes {
-        let mut step = at_rest.follow(&change.joint_points, &change.rest_drives);
+        let mut step = at_rest.follow(change, &change.rest_drives);
         spins.hold(&mut step, change.parameter);
         change.rest = at_rest.twists(&step);
     }
@@ -58,7 +60,7 @@ pub fn motion_changes(design: &Design, motion: &Motion, p: &[f64]) -> Option<Vec
         }
         let here = Follower::new(&mechanism, &state.poses, &state.drives)?;
         for change in &mut changes {
-            let twists = here.twists(&here.follow(&change.joint_points, &held));
+            let twists = here.twists(&here.follow(change, &held));
             for (t, (body, _)) in mechanism.traces.iter().enumerate() {
                 let carried = state.poses[*body].direction(&change.trace_points[t]);
                 change.paths[t][s] = twists[*body].at(&state.traces_mm[t]) + carried;
@@ -76,10 +78,18 @@ pub fn motion_changes(design: &Design, motion: &Motion, p: &[f64]) -> Option<Vec
 fn drawn(design: &Design, values: &Evaluated, parameter: usize, states: usize) -> MotionChange {
     let of = |id: crate::ir::expr::ExprId| values.gradient(id).get(parameter).copied().unwrap_or(0.0);
     let point = |p: &crate::ir::ExprPoint| Vector3::from(p.map(of));
+    let string = |drive: &Drive| match drive.on {
+        DriveOn::String(id) => {
+            let cable = &design.strings[id];
+            [point(&cable.point), cable.via.first().map(point).unwrap_or_default()]
+        }
+        DriveOn::Joint(_) => [Vector3::zeros(); 2],
+    };
     MotionChange {
         parameter,
         rest_drives: design.drives.iter().map(|d| d.free_rest.map_or(0.0, of)).collect(),
         joint_points: design.joints.iter().map(|j| point(&j.point)).collect(),
+        string_points: design.drives.iter().map(string).collect(),
         trace_points: design.traces.iter().map(|t| point(&t.point)).collect(),
         rest: vec![Twist::default(); design.bodies.len()],
         paths: vec![vec![Vector3::zeros(); states]; design.traces.len()],
@@ -103,7 +113,8 @@ impl<'m, 'd> Follower<'m, 'd> {
     }
 
     /// Scaled increments when the joints' points as drawn and the drives' values move.
-    fn follow(&self, joint_points: &[Vector3<f64>], drives: &[f64]) -> DVector<f64> {
+    fn follow(&self, of: &MotionChange, drives: &[f64]) -> DVector<f64> {
+        let joint_points = &of.joint_points;
         let m = self.mechanism;
         let mut by = Vec::with_capacity(self.rows.residual.len());
         let both = |point: Vector3<f64>| GeometryChange {
@@ -117,11 +128,13 @@ impl<'m, 'd> Follower<'m, 'd> {
             let (rows, _) = constraint.design_derivative(self.poses, &lambda, &both(joint_points[*joint]));
             by.extend(rows.iter().take(constraint.rows()).map(|r| r / unit));
         }
-        for ((value, drive), change) in m.drives.iter().zip(&m.design.drives).zip(drives) {
+        for (i, ((value, drive), change)) in m.drives.iter().zip(&m.design.drives).zip(drives).enumerate() {
             let moved = match value {
                 JointValue::Angle(_) => 0.0,
+                JointValue::Pull(pull) => pull.point_derivative(self.poses, of.string_points[i]).0,
                 JointValue::Shift(shift) => {
-                    let (dp, axis) = (joint_points[drive.joint], self.poses[shift.a].direction(&shift.axis));
+                    let dp = drive.joint().map(|j| joint_points[j]).unwrap_or_default();
+                    let (dp, axis) = (dp, self.poses[shift.a].direction(&shift.axis));
                     let [a, b] = [shift.a, shift.b].map(|i| self.poses[i].direction(&dp));
                     axis.dot(&(b - a))
                 }

@@ -1,6 +1,7 @@
 //! Derivatives of constraints and joint values against differences, and what each kind of joint allows.
 
 use super::constraint::{Constraint, GeometryChange, Gradient, Hessian, Jacobian};
+use super::pull::Pull;
 use super::value::{HingeAngle, JointValue};
 use crate::ir::JointKind;
 use crate::math::Pose;
@@ -133,6 +134,14 @@ proptest! {
                 prop_assert!((value.value(&poses, want) - want).abs() < 1e-12);
             }
         }
+    }
+
+    #[test]
+    fn pull_matches_differences(at in poses(), p in vector(20.0), q in vector(20.0)) {
+        let pull = Pull { a: 0, b: 1, point_a: p, point_b: q };
+        // The curvature of a length grows as it shrinks.
+        prop_assume!((at[0].point(&p) - at[1].point(&q)).norm() > 5.0);
+        check(|poses| pull.value(poses), &at, &pull.gradient(&at), &pull.hessian(&at));
     }
 
     #[test]

@@ -3,9 +3,10 @@
 
 use super::constraint::Constraint;
 use super::idle::{self, Idle};
+use super::pull::Pull;
 use super::value::JointValue;
 use crate::diagnostic::Diagnostic;
-use crate::ir::{Design, Drive, DriveUnit, JointId, JointKind, LoadKind};
+use crate::ir::{Design, Drive, DriveOn, DriveUnit, JointId, JointKind, LoadKind};
 use crate::math::{Pose, nearest_turn, twist_about};
 use nalgebra::Vector3;
 
@@ -30,7 +31,7 @@ pub struct Mechanism<'d> {
     pub constraints: Vec<(Constraint, JointId)>,
     /// Value of every joint that has one, by [`JointId`].
     pub values: Vec<Option<JointValue>>,
-    /// Value of every drive's joint.
+    /// Value of what every drive moves.
     pub drives: Vec<JointValue>,
     /// Idle freedoms.
     pub idle: Vec<Idle>,
@@ -84,11 +85,19 @@ impl<'d> Mechanism<'d> {
         }
         let mut drives = Vec::new();
         for drive in &design.drives {
-            match joint_values.get(drive.joint).copied().flatten() {
+            let driven = match drive.on {
+                DriveOn::Joint(joint) => joint_values.get(joint).copied().flatten(),
+                DriveOn::String(string) => design.strings.get(string).and_then(|c| {
+                    let (point_a, point_b) = (point(&c.point), point(c.via.first()?));
+                    let finite = point_a.iter().chain(&point_b).all(|x| x.is_finite());
+                    finite.then_some(JointValue::Pull(Pull { a: c.from, b: c.to, point_a, point_b }))
+                }),
+            };
+            match driven {
                 Some(value) if value.unit() == drive.unit => drives.push(value),
                 _ => errors.push(
                     Diagnostic::error("E0500", format!("`{}` cannot be driven so", drive.name), drive.origin)
-                        .help("a drive turns a hinge (deg) or moves a slider (mm)"),
+                        .help("a drive turns a hinge (deg), moves a slider or pulls a string (mm)"),
                 ),
             }
         }
@@ -208,7 +217,12 @@ fn carry(design: &Design, poses: &mut [Pose]) {
 fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
     let body = |id: &usize| *id < design.bodies.len();
     let joints = design.joints.iter().all(|j| j.bodies.len() > 1 && j.bodies.iter().all(body));
-    let drives = design.drives.iter().all(|d| d.joint < design.joints.len());
+    let drives = design.drives.iter().all(|d| match d.on {
+        DriveOn::Joint(joint) => joint < design.joints.len(),
+        DriveOn::String(string) => {
+            design.strings.get(string).is_some_and(|c| body(&c.from) && body(&c.to) && !c.via.is_empty())
+        }
+    });
     let aims = &design.aims;
     let traces = design.traces.iter().all(|t| body(&t.body))
         && aims.directions.iter().all(|d| body(&d.body))

@@ -12,6 +12,7 @@ pub mod mechanism;
 pub mod mobility;
 pub mod motion;
 mod path;
+mod pull;
 mod standing;
 pub mod value;
 
@@ -23,4 +24,5 @@ pub use linear::RANK_TOLERANCE;
 pub use mechanism::Mechanism;
 pub use mobility::Mobility;
 pub use motion::{JointSpan, Motion, State, solve_motion};
+pub use pull::Pull;
 pub use value::{HingeAngle, JointValue, Shift};

@@ -7,7 +7,7 @@ use super::mobility::{Mobility, names};
 use super::path::{Branch, Sample, Stuck};
 use super::standing;
 use crate::diagnostic::Diagnostic;
-use crate::ir::{BodyId, Design, DriveUnit, JointId, JointKind};
+use crate::ir::{BodyId, Design, DriveOn, DriveUnit, JointId, JointKind};
 use crate::math::Pose;
 use nalgebra::Vector3;
 
@@ -221,15 +221,19 @@ fn cannot_close(design: &Design, stuck: &Stuck, rest: Option<&[f64]>) -> Diagnos
     };
     let message = format!("the mechanism cannot be assembled beyond {}{whither}", list(&stuck.drive));
     let fastest = stuck.rates.iter().fold(0.0, |m, r| f64::max(m, *r));
-    let driven: Vec<JointId> = design.drives.iter().map(|d| d.joint).collect();
+    let driven: Vec<JointId> = design.drives.iter().filter_map(|d| d.joint()).collect();
     let in_loop = |(id, joint)| {
         let breaks = stuck.rates.get(id).is_some_and(|r| *r > BREAKING * fastest) && !driven.contains(&id);
         breaks.then_some(joint)
     };
     let joints: Vec<&crate::ir::Joint> = design.joints.iter().enumerate().filter_map(in_loop).collect();
     let driven_joint = driven.first().and_then(|id| design.joints.get(*id));
-    let mut found = Diagnostic::error("E0503", message, driven_joint.map_or(design.origin, |j| j.origin))
-        .label("driven here");
+    let string = design.drives.first().and_then(|d| match d.on {
+        DriveOn::Joint(_) => None,
+        DriveOn::String(string) => design.strings.get(string),
+    });
+    let place = string.map(|c| c.origin).or(driven_joint.map(|j| j.origin));
+    let mut found = Diagnostic::error("E0503", message, place.unwrap_or(design.origin)).label("driven here");
     if let Some(drive) = design.drives.first() {
         found = found.also(drive.origin, "this range goes too far");
     }

@@ -3,17 +3,20 @@
 
 use super::constraint::{Gradient, Hessian};
 use super::forms::{Along, Product, normals, unit_or_z};
+use super::pull::Pull;
 use crate::ir::{DriveUnit, JointKind};
 use crate::math::Pose;
 use nalgebra::Vector3;
 
-/// Value of a joint.
+/// Value of a joint or a string.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointValue {
     /// Of a hinge or a cylindrical joint, rad.
     Angle(HingeAngle),
     /// Of a slider, mm.
     Shift(Shift),
+    /// Of a string, mm.
+    Pull(Pull),
 }
 
 impl JointValue {
@@ -32,9 +35,14 @@ impl JointValue {
         }
     }
 
-    /// The same value with another reference pose, to which `rest` leads the first body: zero there.
-    pub fn carried(&self, rest: &Pose) -> Self {
+    /// The same value with another reference pose, to which `rest` leads both bodies: zero there.
+    pub fn carried(&self, [rest, second]: [&Pose; 2]) -> Self {
         match self {
+            Self::Pull(pull) => Self::Pull(Pull {
+                point_a: rest.point(&pull.point_a),
+                point_b: second.point(&pull.point_b),
+                ..*pull
+            }),
             Self::Angle(angle) => Self::Angle(HingeAngle {
                 axis: rest.direction(&angle.axis),
                 normal: rest.direction(&angle.normal),
@@ -54,6 +62,7 @@ impl JointValue {
         match self {
             Self::Angle(angle) => [angle.a, angle.b],
             Self::Shift(shift) => [shift.a, shift.b],
+            Self::Pull(pull) => [pull.a, pull.b],
         }
     }
 
@@ -61,7 +70,7 @@ impl JointValue {
     pub fn unit(&self) -> DriveUnit {
         match self {
             Self::Angle(_) => DriveUnit::Rad,
-            Self::Shift(_) => DriveUnit::Mm,
+            Self::Shift(_) | Self::Pull(_) => DriveUnit::Mm,
         }
     }
 
@@ -70,6 +79,7 @@ impl JointValue {
         match self {
             Self::Angle(angle) => angle.value(poses, near),
             Self::Shift(shift) => shift.form(poses).value(),
+            Self::Pull(pull) => pull.value(poses),
         }
     }
 
@@ -78,6 +88,7 @@ impl JointValue {
         match self {
             Self::Angle(angle) => angle.gradient(poses),
             Self::Shift(shift) => shift.form(poses).gradient(),
+            Self::Pull(pull) => pull.gradient(poses),
         }
     }
 
@@ -86,6 +97,7 @@ impl JointValue {
         match self {
             Self::Angle(angle) => angle.hessian(poses),
             Self::Shift(shift) => shift.form(poses).hessian(),
+            Self::Pull(pull) => pull.hessian(poses),
         }
     }
 }

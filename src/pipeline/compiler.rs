@@ -11,7 +11,7 @@ use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
 use crate::emit::stl::stl_bytes;
 use crate::equilibrium::{Cycle, Layout, Model, ModelError, SweepError, sweep};
-use crate::ir::{Design, ObjectiveKind, Solution};
+use crate::ir::{Design, DriveOn, ObjectiveKind, Solution};
 use crate::kinematics::{Constraint, Motion, solve_motion};
 use crate::math::{Pose, log_so3};
 use crate::optimize::{self, Ending, Method, Problem};
@@ -102,6 +102,7 @@ impl Stages for Compiler {
             .collect();
         let mut diagnostics = judge(design, &layout, &cycle);
         diagnostics.extend(news(design, &motion));
+        diagnostics.extend(slack(design, &model, &cycle));
         let (gaps, carving) = solids::gaps(design, &layout, &model, &cycle);
         diagnostics.extend(solids::not_carved(design, &carving));
         diagnostics.extend(solids::collisions(design, &gaps));
@@ -287,6 +288,31 @@ fn lost(design: &Design, error: &SweepError) -> Failed {
             .label(format!("last equilibrium at {}", values.join(", ")))
             .help("the flexures are asked for more than they can do there: lengthen them, or rest nearer to this value"),
     ]
+}
+
+/// Strings that would have to push.
+fn slack(design: &Design, model: &Model, cycle: &Cycle) -> Vec<Diagnostic> {
+    let mut found = Vec::new();
+    for (d, drive) in design.drives.iter().enumerate() {
+        let DriveOn::String(string) = drive.on else { continue };
+        let pulls: Vec<f64> = cycle.states.iter().map(|e| e.drive_load(model, d)).collect();
+        let none = super::measure::no_pull(&pulls);
+        let pushing: Vec<usize> = (0..pulls.len()).filter(|s| pulls[*s] < -none).collect();
+        let (Some(first), Some(at)) = (pushing.first(), design.strings.get(string).map(|c| c.origin)) else {
+            continue;
+        };
+        let (most, count) = (pulls.iter().fold(0.0, |m, p| f64::min(m, *p)), pushing.len());
+        let message = format!("the string `{}` would have to push from state {first}", drive.name);
+        found.push(
+            Diagnostic::warning("W0620", message, at)
+                .label(format!("up to {:.3} N, at {count} of {} states", -most, pulls.len()))
+                .also(drive.origin, "driven here")
+                .help(
+                    "a slack string holds nothing: rest where it begins to pull, or let a load keep it taut",
+                ),
+        );
+    }
+    found
 }
 
 /// What a followed cycle says about itself.

@@ -5,6 +5,9 @@ use super::stages::Simulation;
 use crate::diagnostic::Diagnostic;
 use crate::ir::{Aggregate, Design, DriveUnit, Quantity, Requirement};
 
+/// See [`no_pull`].
+const NO_PULL: f64 = 1e-6;
+
 /// Measures of a simulated cycle.
 pub fn measure(design: &Design, simulation: &Simulation) -> Measures {
     let closed = is_closed(design);
@@ -107,7 +110,7 @@ fn unit(quantity: &Quantity) -> &'static str {
         Quantity::AimError(_) | Quantity::Angle(_) => "deg",
         Quantity::Stress => "MPa",
         Quantity::Torque(_) => "N·mm",
-        Quantity::Force(_) => "N",
+        Quantity::Force(_) | Quantity::Tension(_) => "N",
     }
 }
 
@@ -124,7 +127,17 @@ fn series(simulation: &Simulation, quantity: &Quantity) -> Vec<f64> {
         Quantity::Torque(drive) | Quantity::Force(drive) => {
             states.iter().filter_map(|s| s.drive_loads.get(drive).map(|t| t.abs())).collect()
         }
+        Quantity::Tension(drive) => {
+            let pulls: Vec<f64> = states.iter().filter_map(|s| s.drive_loads.get(drive).copied()).collect();
+            let none = no_pull(&pulls);
+            pulls.into_iter().map(|pull| if pull.abs() < none { 0.0 } else { pull }).collect()
+        }
     }
+}
+
+/// Pulls of a string that are smaller than this (N) are rounding: what is left of those that balance to 1e-9.
+pub fn no_pull(pulls_n: &[f64]) -> f64 {
+    NO_PULL * pulls_n.iter().fold(0.0, |m, p| f64::max(m, p.abs()))
 }
 
 /// One number from a series over the states; none if it is empty or holds something that is no number.

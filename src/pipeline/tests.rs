@@ -34,7 +34,8 @@ fn design() -> Design {
         model: Default::default(),
         drives: vec![crate::ir::Drive {
             name: "motor".into(),
-            joint: hinge,
+            on: crate::ir::DriveOn::Joint(hinge),
+            drum_radius_mm: None,
             unit: DriveUnit::Rad,
             profile: Profile::Range { from: 0.0, to: std::f64::consts::TAU },
             rest: 0.0,
@@ -49,6 +50,7 @@ fn design() -> Design {
             origin,
         }],
         loads: Vec::new(),
+        strings: Vec::new(),
         cycle: Cycle { steps: 4, duration_s: 2.0, origin },
         traces: vec![Trace { name: "tip".into(), body: 0, point: [zero; 3], origin }],
         aims: Default::default(),

@@ -176,6 +176,8 @@ pub enum StatementKind {
         motor: Option<Ident>,
         /// `continuous` was written.
         continuous: bool,
+        /// `drum D`.
+        drum: Option<Expr>,
     },
     /// `rest DRIVE at EXPR`
     Rest {
@@ -222,6 +224,8 @@ pub enum StatementKind {
     },
     /// `export A, B(c)`
     Export(Vec<Expr>),
+    /// `string NAME: BODY at P to BODY via Q, …`
+    String(Box<Cable>),
     /// `load …`
     Load(Box<Load>),
     /// `rod NAME { [axis second] from a at … along … to b at … along … section … }` (templates only)
@@ -243,6 +247,21 @@ pub enum StatementKind {
         /// The words in it: names that it may have declared.
         words: Vec<String>,
     },
+}
+
+/// A string that pulls.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cable {
+    /// Name.
+    pub name: Ident,
+    /// The body it is tied to.
+    pub from: Ident,
+    /// Where.
+    pub at: Expr,
+    /// The body that guides it.
+    pub to: Ident,
+    /// Through which points of that body, in order.
+    pub via: Vec<Expr>,
 }
 
 /// A load on the mechanism.

@@ -1,7 +1,8 @@
 //! Statements: concrete tree to [`ast::StatementKind`].
 
 use super::ast::{
-    At, Compare, Expr, Ident, Joint, Load, Profile, Rod, RodEnd, Statement, StatementKind, TemplateUse, Term,
+    At, Cable, Compare, Expr, Ident, Joint, Load, Profile, Rod, RodEnd, Statement, StatementKind,
+    TemplateUse, Term,
 };
 use super::lower::Lower;
 use super::tree::{Kind, Node};
@@ -77,6 +78,7 @@ impl Lower<'_> {
                 name: self.ident(node)?,
                 points: node.first(Kind::Points).map(|n| self.idents(n)).unwrap_or_default(),
             },
+            Kind::String => StatementKind::String(Box::new(self.string(node)?)),
             Kind::Load => StatementKind::Load(Box::new(self.load(node)?)),
             Kind::Later => StatementKind::Later { keyword: self.named(node.first(Kind::Keyword)?) },
             _ => return None,
@@ -149,9 +151,12 @@ impl Lower<'_> {
     fn drive(&mut self, node: &Node) -> Option<StatementKind> {
         let mut names = self.idents(node).into_iter();
         let (joint, motor) = (names.next()?, names.next());
-        if let Some(drum) = node.first(Kind::Drum).and_then(|n| n.first(Kind::Keyword)) {
-            return Some(StatementKind::Later { keyword: self.named(drum) });
+        let mut drums = node.all(Kind::Drum);
+        let (drum, again) = (drums.next(), drums.next());
+        if let (Some(first), Some(again)) = (drum, again) {
+            self.twice(again, self.origin(first));
         }
+        let drum = drum.and_then(|n| self.value(n));
         let form = node.parts().find(|n| matches!(n.kind, Kind::Range | Kind::By | Kind::Keys))?;
         let profile = match form.kind {
             Kind::Range => {
@@ -162,7 +167,7 @@ impl Lower<'_> {
             _ => self.keys(form),
         };
         let continuous = node.all(Kind::Keyword).any(|n| self.text(n) == "continuous");
-        Some(StatementKind::Drive { joint, profile, motor, continuous })
+        Some(StatementKind::Drive { joint, profile, motor, continuous, drum })
     }
 
     fn keys(&mut self, node: &Node) -> Profile {
@@ -203,6 +208,13 @@ impl Lower<'_> {
         };
         let op = At { node: op, at: self.origin(sign) };
         Some(StatementKind::Require { left: values.next()?, op, right: values.next()? })
+    }
+
+    fn string(&mut self, node: &Node) -> Option<Cable> {
+        let mut names = self.idents(node).into_iter();
+        let (name, from, to) = (names.next()?, names.next()?, names.next()?);
+        let via = self.values(node.first(Kind::Via)?);
+        Some(Cable { name, from, at: self.value(node)?, to, via })
     }
 
     fn load(&mut self, node: &Node) -> Option<Load> {

@@ -85,6 +85,8 @@ pub enum Kind {
     RodSection,
     RodAxis,
     OwnBody,
+    String,
+    Via,
     Load,
     Gravity,
     Moment,

@@ -31,6 +31,7 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
     "rod",
     "body",
     "load",
+    "string",
     "allow",
     "assert",
     "case",
@@ -46,7 +47,6 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
     "solid",
     "spring",
     "stop",
-    "string",
     "sweep",
     "target",
     "tolerance",
@@ -65,7 +65,7 @@ pub(super) fn starts_statement(line: &str) -> bool {
 }
 
 /// How many of [`STATEMENT_WORDS`], which begins with the common ones, help lists.
-pub(super) const COMMON_STATEMENTS: usize = 23;
+pub(super) const COMMON_STATEMENTS: usize = 24;
 
 /// Whether a keyword is a kind of joint.
 pub(super) fn is_joint_kind(word: &str) -> bool {
@@ -104,6 +104,7 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "export" => "export NAME, …",
         "body" => "body NAME",
         "rod" => "rod NAME { from a at … along … to b at … along … section … }",
+        "string" => "string NAME: BODY at POINT to BODY via POINT",
         "load" => "load FORCE along DIRECTION on BODY at POINT",
         _ => return None,
     })

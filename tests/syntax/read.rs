@@ -192,6 +192,8 @@ fn statements_of_the_whole_language_are_known_by_their_keyword() {
                 format!("{} keys {:?} {continuous}", keys.len(), motor.as_ref().map(|m| m.node.as_str()))
             }
             StatementKind::Load(_) => "load".into(),
+            StatementKind::String(cable) => format!("string via {}", cable.via.len()),
+            StatementKind::Drive { drum: Some(_), continuous, .. } => format!("drum {continuous}"),
             other => panic!("{other:?}"),
         })
         .collect();
@@ -201,11 +203,11 @@ fn statements_of_the_whole_language_are_known_by_their_keyword() {
             "place",
             "mirror",
             "mount",
-            "string",
+            "string via 1",
             "variant",
             "assert",
             "2 keys Some(\"xl320\") true",
-            "drum",
+            "drum false",
             "load"
         ]
     );

@@ -46,7 +46,7 @@ pub struct Sketch {
 pub enum SketchError {
     /// The design has no such drive.
     NoDrive,
-    /// The drive slides: no motor turns it.
+    /// The drive slides, and no drum says how a motor turns for it.
     Slides,
     /// The drive names no motor.
     NoMotor,
@@ -89,7 +89,7 @@ impl fmt::Display for SketchError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoDrive => write!(f, "there is no such drive"),
-            Self::Slides => write!(f, "the drive slides: no motor turns it"),
+            Self::Slides => write!(f, "the drive slides, and has no drum"),
             Self::NoMotor => write!(f, "the drive has no motor"),
             Self::NotAStepper { motor } => {
                 write!(f, "`{motor}` is not a stepper, and sketches for other motors are not available yet")
@@ -146,7 +146,7 @@ impl Sketch {
     /// When there is no such drive, or its motor is not a stepper.
     pub fn of(design: &Design, drive: usize, values: &[f64]) -> Result<Self, SketchError> {
         let drive = design.drives.get(drive).ok_or(SketchError::NoDrive)?;
-        if drive.unit != DriveUnit::Rad {
+        if drive.unit != DriveUnit::Rad && drive.drum_radius_mm.is_none() {
             return Err(SketchError::Slides);
         }
         let motor = drive.motor.as_ref().ok_or(SketchError::NoMotor)?;
@@ -158,16 +158,18 @@ impl Sketch {
             return Err(SketchError::States { states });
         }
         let rest = drive.rest_value(&design.exprs.values(values));
-        let angle = |state| drive.value(state as f64 / states as f64) - rest;
+        let angle =
+            |state| drive.motor_angle_rad(state as f64 / states as f64, rest).ok_or(SketchError::Slides);
         Ok(Self {
             mechanism: design.name.clone(),
             drive: drive.name.clone(),
             steps_per_turn,
             microsteps,
-            angles_rad: (0..=states).map(angle).collect(),
+            angles_rad: (0..=states).map(angle).collect::<Result<_, _>>()?,
             duration_s: design.cycle.duration_s,
             closed: drive.is_closed(),
-            rest_rad: rest,
+            // Of a drum the motor's own angle counts, which is zero at rest.
+            rest_rad: if drive.unit == DriveUnit::Rad { rest } else { 0.0 },
         })
     }
 

@@ -104,7 +104,7 @@ pub fn build(design: &Design, layout: &Layout) -> (Vec<Term>, Vec<Vec<PointForce
                 Term::Sum(Box::new(collision::Collision::new(design, *gap_mm, o.weight)))
             }
             ObjectiveKind::Torque { drive, reference_n_mm } => {
-                let name = &design.drives[*drive].name;
+                let name = format!("torque({})", design.drives[*drive].name);
                 Term::Peak(Box::new(torque::Torque::new(name, *drive, *reference_n_mm, o.weight)))
             }
             ObjectiveKind::TrackAs { trace, scale_mm, closest, emphasis } => {
@@ -136,6 +136,10 @@ pub fn build(design: &Design, layout: &Layout) -> (Vec<Term>, Vec<Vec<PointForce
             }
             ObjectiveKind::PaperStress { scale_mpa } => {
                 Term::Peak(Box::new(paper::PaperStress::new(*scale_mpa, o.weight)))
+            }
+            ObjectiveKind::Force { drive, reference_n } => {
+                let name = format!("force({})", design.drives[*drive].name);
+                Term::Peak(Box::new(torque::Torque::new(name, *drive, *reference_n, o.weight)))
             }
         })
         .collect();

@@ -1,5 +1,5 @@
 //! Actuation (Megaro et al. 2017, section 4.3): soft maximum of (τ/τ₀)² over the cycle, τ₀ the motor's stall
-//! torque. The paper takes τ from central differences of the energy (eq. 5), which mixes drives; here it is the
+//! torque; likewise the force of what slides. The paper takes τ from central differences of the energy (eq. 5), which mixes drives; here it is the
 //! drive row's own multiplier, τ = dΠ/dα = −λ, exact.
 
 use super::{Level, STEPS_OF_WEIGHTS, Sampled, StateView, StatesSensitivity};
@@ -9,19 +9,19 @@ use crate::optimize::Normal;
 pub struct Torque {
     name: String,
     drive: usize,
-    reference_n_mm: f64,
+    reference: f64,
     weight: f64,
 }
 
 impl Torque {
-    /// Torque of drive number `drive`; `reference_n_mm` counts as one.
-    pub fn new(drive_name: &str, drive: usize, reference_n_mm: f64, weight: f64) -> Self {
-        Self { name: format!("torque({drive_name})"), drive, reference_n_mm, weight }
+    /// Load of drive number `drive`; `reference` counts as one, N·mm or of what slides N.
+    pub fn new(name: String, drive: usize, reference: f64, weight: f64) -> Self {
+        Self { name, drive, reference, weight }
     }
 
     /// τ/τ₀.
     fn relative(&self, view: &StateView) -> f64 {
-        view.equilibrium.drive_load(view.model, self.drive) / self.reference_n_mm
+        view.equilibrium.drive_load(view.model, self.drive) / self.reference
     }
 }
 
@@ -44,7 +44,7 @@ impl Sampled for Torque {
         if slope == 0.0 {
             return;
         }
-        let by_parameters = relative_row(view, at, self.drive, self.reference_n_mm);
+        let by_parameters = relative_row(view, at, self.drive, self.reference);
         // x = τ²: ∇x = 2τ∇τ, and 2∇τ∇τᵀ of its own curvature.
         let curvature = 2.0 * slope + level.curvature(slope) * 4.0 * torque * torque;
         out.add_model(self.weight * slope * 2.0 * torque, self.weight * curvature, &by_parameters);
