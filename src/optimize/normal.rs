@@ -11,12 +11,19 @@ pub struct Normal {
     pub gradient: DVector<f64>,
     /// n × n, lower triangle filled until [`Normal::complete`].
     pub gauss_newton: DMatrix<f64>,
+    /// n; belongs to the gradient, but not to what a soft maximum's matrix is corrected by.
+    pub tilt: DVector<f64>,
 }
 
 impl Normal {
     /// Zero.
     pub fn new(n: usize) -> Self {
-        Self { cost: 0.0, gradient: DVector::zeros(n), gauss_newton: DMatrix::zeros(n, n) }
+        Self {
+            cost: 0.0,
+            gradient: DVector::zeros(n),
+            gauss_newton: DMatrix::zeros(n, n),
+            tilt: DVector::zeros(n),
+        }
     }
 
     /// Adds ½ w r² with gradient `row` of r.
@@ -49,10 +56,18 @@ impl Normal {
         }
     }
 
+    /// Adds a part of the gradient alone: see [`Self::tilt`].
+    pub fn add_tilt(&mut self, slope: f64, row: &[f64]) {
+        for (t, r) in self.tilt.iter_mut().zip(row) {
+            *t += slope * r;
+        }
+    }
+
     /// Adds a sum over m other variables that depend on the n through `chain` (m × n).
     pub fn add_chained(&mut self, other: &Self, chain: &DMatrix<f64>) {
         self.cost += other.cost;
         self.gradient.gemv_tr(1.0, chain, &other.gradient, 1.0);
+        self.tilt.gemv_tr(1.0, chain, &other.tilt, 1.0);
         let product = chain.tr_mul(&(&other.gauss_newton * chain));
         self.gauss_newton += product.lower_triangle();
     }
@@ -61,6 +76,7 @@ impl Normal {
     pub fn merge(&mut self, other: &Self) {
         self.cost += other.cost;
         self.gradient += &other.gradient;
+        self.tilt += &other.tilt;
         self.gauss_newton += &other.gauss_newton;
     }
 

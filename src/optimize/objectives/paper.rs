@@ -2,6 +2,9 @@
 //! of τ², N²m², and of von Mises stress, over all states and sampled points with equal weights, β = 50/x_ref, x_ref the
 //! largest x at the first point of a run. It falls when a low value rises, and reads low; see `soft_maximum.rs` for ours.
 //!
+//! Its gradient is exact. Its second derivatives may be negative: the quadratic model takes those of
+//! ln(Σ e^{βx})/β in their place, which are not, and the rest of the gradient as a tilt.
+//!
 //! τ is the exact torque, not eq. 5's central difference of energies: that tends to it with finer steps, and where
 //! there are several drives it adds up their work.
 
@@ -44,15 +47,16 @@ impl Sampled for PaperTorque {
 
     fn accumulate(&self, view: &StateView, at: &StatesSensitivity, level: &Level, out: &mut Normal) {
         let torque = view.equilibrium.drive_load(view.model, self.drive) / self.reference_n_mm;
-        let slope = level.slope(torque * torque, 1.0);
-        let curvature = level.curvature_at(torque * torque, 1.0);
-        if slope == 0.0 && curvature == 0.0 {
+        let share = level.share(torque * torque, 1.0);
+        if share == 0.0 {
             return;
         }
         let row = torque::relative_row(view, at, self.drive, self.reference_n_mm);
-        // x = τ²: ∇x = 2τ∇τ, and 2∇τ∇τᵀ of its own curvature where the slope is positive.
-        let bend = 2.0 * slope.max(0.0) + curvature * 4.0 * torque * torque;
-        out.add_model(self.weight * slope * 2.0 * torque, self.weight * bend, &row);
+        // x = τ²: ∇x = 2τ∇τ, and 2∇τ∇τᵀ of its own curvature.
+        let curvature = 2.0 * share + level.curvature(share) * 4.0 * torque * torque;
+        out.add_model(self.weight * share * 2.0 * torque, self.weight * curvature, &row);
+        let tilt = level.slope(torque * torque, 1.0) - share;
+        out.add_tilt(self.weight * tilt * 2.0 * torque, &row);
     }
 }
 
@@ -89,11 +93,13 @@ impl Sampled for PaperStress {
     fn accumulate(&self, view: &StateView, at: &StatesSensitivity, level: &Level, out: &mut Normal) {
         let mut own = stress::OwnDirections::new(view, at);
         stress::for_each_sample(view, |rod, station, point, x, _| {
-            let slope = level.slope(x, 1.0);
-            let curvature = level.curvature_at(x, 1.0);
-            if slope != 0.0 || curvature != 0.0 {
+            let share = level.share(x, 1.0);
+            if share > 0.0 {
+                let curvature = self.factor * level.curvature(share);
+                let tilt = self.factor * (level.slope(x, 1.0) - share);
                 own.with_row(rod, station, point, |normal, row| {
-                    normal.add_model(self.factor * slope, self.factor * curvature, row);
+                    normal.add_model(self.factor * share, curvature, row);
+                    normal.add_tilt(tilt, row);
                 });
             }
         });

@@ -101,14 +101,9 @@ impl Level {
     }
 
     /// Part of a sample in the whole, Σ = 1; 0 where it does not matter.
-    fn share(&self, x: f64, w: f64) -> f64 {
+    pub fn share(&self, x: f64, w: f64) -> f64 {
         let exponent = self.beta * (x - self.base);
         if exponent < NEGLIGIBLE { 0.0 } else { w * exponent.exp() }
-    }
-
-    /// A positive curvature by ∇x ∇xᵀ of a sample of the paper's form, whose own may be negative.
-    pub fn curvature_at(&self, x: f64, w: f64) -> f64 {
-        self.beta * self.share(x, w)
     }
 
     /// Factor of ∇x ∇xᵀ that belongs to a sample's slope: β ∂S/∂x. The rest of ∇²S, −β ∇S ∇Sᵀ, couples all
@@ -121,7 +116,7 @@ impl Level {
     /// Jensen's inequality the matrix stays positive semidefinite.
     pub fn complete(&self, weight: f64, total: &mut Normal) {
         total.cost = weight * self.value;
-        if weight <= 0.0 || self.form == SoftForm::Paper {
+        if weight <= 0.0 {
             return;
         }
         let factor = self.beta / weight;
@@ -130,6 +125,8 @@ impl Level {
                 total.gauss_newton[(i, j)] -= factor * total.gradient[i] * total.gradient[j];
             }
         }
+        total.gradient += &total.tilt;
+        total.tilt.fill(0.0);
     }
 }
 
