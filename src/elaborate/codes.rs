@@ -66,11 +66,11 @@ codes! {
     EXPORT "E0415" "an export that lacks what it needs";
     KEYS "E0416" "keys of a drive that do not run from 0 % to 100 %";
     NOT_DRIVEN "E0417" "a drive of a joint that has no single value";
-    NONCONSERVATIVE "E0430" "a moment whose work would depend on the way";
-    WEIGHTLESS "E0431" "gravity on a material that states no density";
-    NO_TARGET "E0432" "the error of a trace without a target";
-    STRING "E0433" "a string that cannot pull";
-    DRUM "E0434" "a motor on something that slides without a drum, or a drum without need";
+    NONCONSERVATIVE "E0440" "a moment whose work would depend on the way";
+    WEIGHTLESS "E0441" "gravity on a material that states no density";
+    NO_TARGET "E0442" "the error of a trace without a target";
+    STRING "E0443" "a string that cannot pull";
+    DRUM "E0444" "a motor on something that slides without a drum, or a drum without need";
     LATER_STATEMENT "E0901" "a statement that is not available yet";
     LATER_TERM "E0902" "an objective, query, export or function that is not available yet";
     LATER_JOINT "E0903" "a kind of joint that is not available yet";
