@@ -325,7 +325,11 @@ fn every_standard_material_and_process_elaborates() {
             "processes" => CHEBYSHEV
                 .replace("use std.processes.polyjet", &format!("use std.{module}"))
                 .replace("print on polyjet", &format!("print on {name}")),
-            "motors" => CHEBYSHEV.replace("nema17", name),
+            // The crank turns fully, which a servo only does where it is said to.
+            "motors" => {
+                let text = CHEBYSHEV.replace("nema17", name);
+                text.replace(&format!("with {name}"), &format!("with {name} continuous"))
+            }
             "flexures" => host_of(&module),
             other => panic!("a folder without a test: {other}"),
         };
