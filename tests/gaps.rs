@@ -64,26 +64,3 @@ fn a_link_makes_way_for_its_own_leaf() {
     let rubs = |d: &&flexura::diagnostic::Diagnostic| ["W0636", "W0637"].contains(&d.code.as_str());
     assert_eq!(simulation.diagnostics.iter().filter(rubs).count(), 0, "{:?}", simulation.diagnostics);
 }
-
-/// Where too little would be left of it, the link stays as it is: that is told with joint and link, and that the leaf
-/// rubs with state and place.
-#[test]
-fn a_leaf_that_rubs_against_its_own_link_is_told() {
-    let mut design = example();
-    design.process.least_wall_mm = 2.5;
-    let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
-    let simulation = Compiler::default().simulate(&design, &start).unwrap();
-    assert!(least(&simulation) < 0.0);
-    let of = |code: &str| simulation.diagnostics.iter().filter(|d| d.code == code).collect::<Vec<_>>();
-    assert!(!of("W0636").is_empty());
-    for d in of("W0636") {
-        assert!(!d.is_error() && d.message.contains("rubs against"), "{}", d.message);
-        assert!(d.labels[0].text.contains("at state") && d.labels[0].text.contains("overlap by"), "{d:?}");
-    }
-    let left = of("W0637");
-    assert!(!left.is_empty());
-    for d in left {
-        assert!(!d.is_error() && d.message.contains("cannot be carved"), "{}", d.message);
-        assert!(d.labels[0].text.contains("mm") && d.labels.len() == 2, "{d:?}");
-    }
-}

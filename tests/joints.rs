@@ -214,10 +214,17 @@ fn units_of_the_columns_follow_the_drives() {
         let request = Request { source: "main.mech".into(), steps: Some(4), ..Request::default() };
         let (out, simulation) = simulate(&request, Show::default(), &Compiler::default(), &files(text));
         let told: Vec<String> = out.diagnostics.iter().map(|d| format!("{} {}", d.code, d.message)).collect();
+        // What meets is told with its state and place.
+        for d in out.diagnostics.iter().filter(|d| ["W0635", "W0636"].contains(&d.code.as_str())) {
+            assert!(!d.is_error(), "{d:?}");
+            let text = &d.labels[0].text;
+            assert!(text.contains("at state") && text.contains("overlap by"), "{text}");
+        }
         (flexura::emit::csv::columns(&simulation.unwrap().motion), told)
     };
     let (columns, mut told) = names(&hand());
-    // All links lie in one layer there: as printed bodies they meet.
+    // All links lie in one layer there: as printed bodies they meet, and leaves rub against them.
+    assert!(["W0635", "W0636"].iter().all(|code| told.iter().any(|t| t.starts_with(code))), "{told:?}");
     told.retain(|t| !t.starts_with("W0635") && !t.starts_with("W0636"));
     assert!(
         columns.contains(&"drive.guide_mm".into()) && columns.contains(&"force.guide_n".into()),

