@@ -1,6 +1,6 @@
 //! A body as capsules with exact derivatives by the design parameters: the link geometry that the optimiser sees
-//! (paper, section 3.3). A slot becomes a *fan*: copies of one capsule side by side, inscribed in the slot, which
-//! touch its flat faces and leave only its rounded-off corners out.
+//! (paper, section 3.3). A slot becomes *fans*: copies of one capsule side by side, inscribed in the slot. A thick one
+//! touches its faces in the middle, thin ones along its sides and round its ends reach into its corners.
 
 use super::anchor::{Anchor, Follow, Followed};
 use super::link::{BodyPlan, Role};
@@ -11,9 +11,11 @@ use std::f64::consts::PI;
 
 /// Sizes below this are none, mm.
 const NOTHING_MM: f64 = 1e-9;
-/// Diameters that cover the end of a flat slot (a disc wider than high): with four the outline is missed by
-/// 1 − cos 22.5°, 8 % of what the disc is wider than high.
-const DIAMETERS: usize = 4;
+/// Diameters that cover a round end: with six its outline is missed by at most 1 − cos 15°, 3.4 % of the radius.
+const DIAMETERS: usize = 6;
+/// Radius of the thin capsules as a part of the slot's least half width: what they miss of a square corner is
+/// (√2 − 1) of it, less what the corner is rounded.
+const THIN: f64 = 0.3;
 
 /// A fan of capsules of one body in rest coordinates, with first derivatives by the n design parameters.
 ///
@@ -92,40 +94,76 @@ fn add_slot(
     };
     let d = slot.end - slot.start;
     let length = d.norm();
-    if half >= radius {
-        // Higher than wide: copies above one another.
-        out.push(SkeletonCapsule {
-            spread_mm: half - radius,
-            d_spread_dp: &by_half - &by_radius,
-            ..capsule(ends, moved)
-        });
-        return;
-    }
     let (wide, by_wide) = (radius - half, &by_radius - &by_half);
+    // Directions across the slot: with a length normal to it, else fixed in the body.
+    let first = super::slot::any_normal(&slot.axis);
+    let mut across = Turning { at: slot.axis.cross(&first), by: still() };
     if length > NOTHING_MM {
-        // Wider than high: copies side by side.
         let u = d / length;
-        let side = slot.axis.cross(&u);
         let turn = (Matrix3::identity() - u * u.transpose()) / length;
-        let d_side = crate::math::skew(&slot.axis) * turn * (&moved[1] - &moved[0]);
+        let by = crate::math::skew(&slot.axis) * turn * (&moved[1] - &moved[0]);
+        across = Turning { at: slot.axis.cross(&u), by };
+    }
+    // In the middle: copies above one another, or side by side.
+    if half >= radius {
         out.push(SkeletonCapsule {
-            fan: side,
-            d_fan_dp: d_side,
+            spread_mm: -wide,
+            d_spread_dp: -&by_wide,
+            ..capsule(ends, moved.clone())
+        });
+    } else if length > NOTHING_MM {
+        out.push(SkeletonCapsule {
+            fan: across.at,
+            d_fan_dp: across.by.clone(),
             spread_mm: wide,
             d_spread_dp: by_wide.clone(),
             ..capsule(ends, moved.clone())
         });
-    }
-    // The discs at its ends by their diameters, in directions fixed in the body.
-    let first = super::slot::any_normal(&slot.axis);
-    let second = slot.axis.cross(&first);
-    let count = if length > NOTHING_MM { 2 } else { 1 };
-    for (at, moved) in ends.iter().zip(&moved).take(count) {
-        for k in 0..DIAMETERS {
-            let (sin, cos) = (PI * k as f64 / DIAMETERS as f64).sin_cos();
-            let u = first * cos + second * sin;
+    } else {
+        for u in diameters(&first, &across.at) {
             let by = u * &by_wide;
-            out.push(capsule([at - u * wide, at + u * wide], [moved - &by, moved + &by]));
+            let ends = [slot.start - u * wide, slot.start + u * wide];
+            out.push(capsule(ends, [&moved[0] - &by, &moved[0] + &by]));
         }
     }
+    // Thin ones, upright fans along the outline.
+    let (thin, by_thin) =
+        if radius <= half { (THIN * radius, &by_radius * THIN) } else { (THIN * half, &by_half * THIN) };
+    let (off, by_off) = (radius - thin, &by_radius - &by_thin);
+    let upright = |ends, d_ends_dp| SkeletonCapsule {
+        spread_mm: half - thin,
+        d_spread_dp: &by_half - &by_thin,
+        radius_mm: thin,
+        d_radius_dp: by_thin.clone(),
+        ..capsule(ends, d_ends_dp)
+    };
+    if length > NOTHING_MM {
+        let by = &across.by * off + across.at * &by_off;
+        for sign in [-1.0, 1.0] {
+            let by = &by * sign;
+            out.push(upright(ends.map(|p| p + across.at * (off * sign)), [&moved[0] + &by, &moved[1] + &by]));
+        }
+    }
+    // Bars end in bosses and eyes, stubs with a nose.
+    if length <= NOTHING_MM || matches!(role, Role::Stub(_)) {
+        for u in diameters(&first, &slot.axis.cross(&first)) {
+            let by = u * &by_off;
+            let ends = [slot.start - u * off, slot.start + u * off];
+            out.push(upright(ends, [&moved[0] - &by, &moved[0] + &by]));
+        }
+    }
+}
+
+/// A direction and its derivative, 3 × n.
+struct Turning {
+    at: Vector3<f64>,
+    by: Matrix3xX<f64>,
+}
+
+/// Directions all round in the plane of two unit vectors.
+fn diameters(first: &Vector3<f64>, second: &Vector3<f64>) -> [Vector3<f64>; DIAMETERS] {
+    std::array::from_fn(|k| {
+        let (sin, cos) = (PI * k as f64 / DIAMETERS as f64).sin_cos();
+        first * cos + second * sin
+    })
 }

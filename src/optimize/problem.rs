@@ -181,7 +181,9 @@ impl<'d> Problem<'d> {
         for (o, reference) in self.objectives.iter().zip(references) {
             match o {
                 Term::Sum(o) => {
-                    terms.push(views.iter().map(|view| o.cost(view)).sum());
+                    // Summed in order, whatever the number of threads.
+                    let costs: Vec<f64> = views.par_iter().map(|view| o.cost(view)).collect();
+                    terms.push(costs.iter().sum());
                     levels.push(None);
                 }
                 Term::Peak(o) => {

@@ -8,6 +8,10 @@ use crate::math::{Pose, skew};
 use crate::rod::{RodState, SectionShape};
 use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
 
+/// What the outline of a link's fan may recede between its copies, mm …
+const DIP_MM: f64 = 0.06;
+/// … as long as that takes no more copies on either side of the middle.
+const MOST_PAIRS: f64 = 16.0;
 /// Numbers a strip is made of: two ends, fan direction, spread, radius.
 pub const NUMBERS: usize = 11;
 
@@ -206,7 +210,9 @@ pub fn rod_jacobian(model: &Model, at: &Sensitivity, r: usize, j: usize) -> Opti
 
 /// A link's capsules at a pose.
 pub fn link_strip(capsule: &SkeletonCapsule, pose: &Pose) -> Strip {
-    let pairs = (capsule.spread_mm / (0.5 * capsule.radius_mm)).ceil().clamp(1.0, 16.0) as usize;
+    // Half-way between two copies at a distance e the outline recedes by e²/8D, D at least two radii.
+    let step = (16.0 * DIP_MM * capsule.radius_mm).sqrt();
+    let pairs = (capsule.spread_mm / step).ceil().clamp(1.0, MOST_PAIRS) as usize;
     Strip {
         ends: capsule.ends.map(|p| pose.point(&p)),
         fan: pose.direction(&capsule.fan),
