@@ -5,6 +5,7 @@
 //! The rods are condensed one by one onto the links they join, so what is solved here is a small
 //! symmetric saddle-point system of link increments and multipliers.
 
+mod landscape;
 mod layout;
 mod load;
 mod model;
@@ -13,6 +14,7 @@ mod saddle;
 mod sensitivity;
 mod sweep;
 
+pub use landscape::{Balance, Landscape, Rest, Snap, landscape};
 pub use layout::{Layout, RodEndFrame};
 pub use load::PointForce;
 pub use model::{Model, ModelError, ModelRod, State};

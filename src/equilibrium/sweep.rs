@@ -62,12 +62,25 @@ pub fn sweep(model: &Model) -> Result<Cycle, SweepError> {
 
 /// A followed equilibrium and the drive values it belongs to.
 #[derive(Clone)]
-struct Walker {
+pub(super) struct Walker {
     equilibrium: Equilibrium,
     drives: Vec<f64>,
 }
 
 impl Walker {
+    /// At an equilibrium with the drives at `drives`, relative to rest.
+    pub(super) fn new(equilibrium: Equilibrium, drives: Vec<f64>) -> Self {
+        Self { equilibrium, drives }
+    }
+
+    pub(super) fn equilibrium(&self) -> &Equilibrium {
+        &self.equilibrium
+    }
+
+    pub(super) fn into_equilibrium(self) -> Equilibrium {
+        self.equilibrium
+    }
+
     fn at_rest(model: &Model, solver: &mut Solver) -> Result<Self, SweepError> {
         let drives = vec![0.0; model.layout.drives.len()];
         let equilibrium = solver
@@ -82,7 +95,7 @@ impl Walker {
     }
 
     /// Goes to `target`, in one step where that works.
-    fn walk(
+    pub(super) fn walk(
         &mut self,
         model: &Model,
         solver: &mut Solver,

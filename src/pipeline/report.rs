@@ -1,5 +1,6 @@
 //! What a build tells: the numbers before and after, what was required, what was made, how long it took.
 
+use super::stability::Stability;
 use crate::diagnostic::{Diagnostic, SourceMap};
 use crate::ir::{Design, Solution};
 use serde::Serialize;
@@ -16,6 +17,8 @@ pub struct Measures {
     pub stress: StressMeasures,
     /// Between moving solids.
     pub gap: GapMeasures,
+    /// With the drives released.
+    pub stability: Stability,
 }
 
 /// A trace against its target.
