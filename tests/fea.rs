@@ -14,7 +14,7 @@ use nalgebra::{SMatrix, SVector, Vector3};
 use std::collections::BTreeMap;
 
 const MATERIAL: RodMaterial = RodMaterial { e_mpa: 1500.0, nu: 0.4 };
-const SHEAR: Corrections = Corrections { shear: true, width: false, warping: false };
+const SHEAR: Corrections = Corrections { shear: true, width: false, warping: false, wagner: false };
 /// Edges of each rod; even, so that a vertex lies at half length.
 const EDGES: usize = 80;
 /// Agreement with the reference rod.

@@ -9,7 +9,7 @@ use flexura::kinematics::solve_motion;
 use flexura::rod::{Corrections, Rod, RodOptions};
 use std::collections::BTreeMap;
 
-const SHEAR: Corrections = Corrections { shear: true, width: false, warping: false };
+const SHEAR: Corrections = Corrections { shear: true, width: false, warping: false, wagner: false };
 const HINGE: &str = include_str!("fea/hinge.mech");
 const PIVOT: &str = include_str!("fea/pivot.mech");
 const CANTILEVER: &str = include_str!("loads/cantilever.mech");

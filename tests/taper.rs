@@ -146,7 +146,7 @@ fn without_a_difference_it_is_the_uniform_rod() {
     for section in [SectionShape::Ellipse, SectionShape::Rectangle] {
         let q = RodParameters::straight(Vector3::zeros(), Vector3::x() * L, Vector3::z(), A[0], B);
         let build = |taper: bool| {
-            let corrections = Corrections { shear: true, width: true, warping: true };
+            let corrections = Corrections { shear: true, width: true, warping: true, wagner: true };
             let options = RodOptions { section, corrections, taper, ..RodOptions::default() };
             let rod = Rod::with_options(&q, MATERIAL, 12, options, false).unwrap();
             let mut s = SingleRod::new(rod, Vector3::zeros(), Vector3::x() * L);

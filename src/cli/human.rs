@@ -36,6 +36,12 @@ pub fn report(out: &BuildOutcome, written: &[(String, usize)], style: Style) -> 
         let _ = writeln!(text, "solved  {how}, {end}");
     }
     measures(&mut text, out.before.as_ref(), out.after.as_ref(), style);
+    if let Some(after) = &out.after {
+        let rests = super::released::released(&after.stability);
+        if !rests.is_empty() {
+            let _ = write!(text, "\n{rests}");
+        }
+    }
     requirements(&mut text, out, style);
     artefacts(&mut text, written, style);
     let s = &out.seconds;

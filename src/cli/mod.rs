@@ -5,6 +5,7 @@ mod artefacts;
 mod commands;
 mod human;
 mod progress;
+mod released;
 mod render;
 mod sources;
 mod style;

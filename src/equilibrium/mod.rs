@@ -8,6 +8,7 @@
 mod change;
 mod design_load;
 mod frames;
+mod landscape;
 mod layout;
 mod load;
 mod model;
@@ -21,6 +22,7 @@ mod weight;
 pub use change::{DirectionChange, DriveChange, EndFrameChange, LayoutChange, TraceChange};
 pub use design_load::{LayoutLoad, LayoutLoadKind};
 pub use frames::RodEndFrame;
+pub use landscape::{Balance, Landscape, Rest, Snap, landscape};
 pub use layout::Layout;
 pub use load::{PointForce, PointForceChange};
 pub use model::{Model, ModelError, ModelRod, State};

@@ -68,12 +68,25 @@ pub fn sweep(model: &Model) -> Result<Cycle, SweepError> {
 
 /// A followed equilibrium and the controls it belongs to.
 #[derive(Clone)]
-struct Walker {
+pub(super) struct Walker {
     equilibrium: Equilibrium,
     controls: Vec<f64>,
 }
 
 impl Walker {
+    /// At an equilibrium with its controls.
+    pub(super) fn new(equilibrium: Equilibrium, controls: Vec<f64>) -> Self {
+        Self { equilibrium, controls }
+    }
+
+    pub(super) fn equilibrium(&self) -> &Equilibrium {
+        &self.equilibrium
+    }
+
+    pub(super) fn into_equilibrium(self) -> Equilibrium {
+        self.equilibrium
+    }
+
     fn at_rest(model: &Model, solver: &mut Solver) -> Result<Self, SweepError> {
         let controls = vec![0.0; model.layout.drives.len() + model.layout.loads.len()];
         let equilibrium = solver
@@ -88,7 +101,7 @@ impl Walker {
     }
 
     /// Goes to `target`, in one step where that works.
-    fn walk(
+    pub(super) fn walk(
         &mut self,
         model: &Model,
         solver: &mut Solver,

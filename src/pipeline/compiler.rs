@@ -5,12 +5,13 @@ use super::aims::AimSeries;
 use super::progress::Iteration;
 use super::report::Artefact;
 use super::solids;
+use super::stability;
 use super::stages::{Checked, Failed, Simulation, Solved, Stages};
 use crate::diagnostic::Diagnostic;
 use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
 use crate::emit::stl::stl_bytes;
-use crate::equilibrium::{Cycle, Layout, Model, ModelError, SweepError, sweep};
+use crate::equilibrium::{Cycle, Equilibrium, Layout, Model, ModelError, SweepError, sweep};
 use crate::ir::{Design, DriveOn, ObjectiveKind, Solution};
 use crate::kinematics::{Constraint, Motion, solve_motion};
 use crate::math::{Pose, log_so3};
@@ -92,7 +93,7 @@ impl Stages for Compiler {
             .iter()
             .enumerate()
             .map(|(i, t)| {
-                let distance = |(e, target): (&crate::equilibrium::Equilibrium, &Vector3<f64>)| {
+                let distance = |(e, target): (&Equilibrium, &Vector3<f64>)| {
                     (e.state.poses[t.body].point(&t.rest) - target).norm()
                 };
                 // Without a drive the conventional mechanism stands still: that is no target.
@@ -103,13 +104,14 @@ impl Stages for Compiler {
         let mut diagnostics = judge(design, &layout, &cycle);
         diagnostics.extend(news(design, &motion));
         diagnostics.extend(slack(design, &model, &cycle));
+        let stability = stability::released(design, &layout, &model, &cycle, &mut diagnostics);
         let (gaps, carving) = solids::gaps(design, &layout, &model, &cycle);
         diagnostics.extend(solids::not_carved(design, &carving));
         diagnostics.extend(solids::collisions(design, &gaps));
         let gaps_mm = gaps.least.iter().filter_map(|g| g.map(|g| g.gap_mm)).collect();
         let aims = AimSeries::compliant(design, &layout, &motion, &cycle);
         let motion = MotionTable { more: aims.columns(design), ..table(design, true, states.collect()) };
-        Ok(Simulation { motion, errors_mm, aims, gaps_mm, diagnostics })
+        Ok(Simulation { motion, errors_mm, aims, gaps_mm, stability, diagnostics })
     }
 
     fn optimize(
@@ -268,12 +270,7 @@ fn no_rod(design: &Design, error: &ModelError) -> Failed {
 }
 
 fn lost(design: &Design, error: &SweepError) -> Failed {
-    let values: Vec<String> = design
-        .drives
-        .iter()
-        .zip(&error.last_drives)
-        .map(|(d, v)| format!("{} = {}", d.name, d.unit.show(*v)))
-        .collect();
+    let values = stability::shown(design, &error.last_drives);
     let message = format!("the mechanism cannot be followed to state {}", error.state);
     if let ([], Some(load)) = (design.drives.as_slice(), design.loads.first()) {
         return vec![
@@ -283,11 +280,9 @@ fn lost(design: &Design, error: &SweepError) -> Failed {
         ];
     }
     let at = design.drives.first().map_or(design.origin, |d| d.origin);
-    vec![
-        Diagnostic::error("E0602", message, at)
-            .label(format!("last equilibrium at {}", values.join(", ")))
-            .help("the flexures are asked for more than they can do there: lengthen them, or rest nearer to this value"),
-    ]
+    vec![Diagnostic::error("E0602", message, at).label(format!("last equilibrium at {values}")).help(
+        "the flexures are asked for more than they can do there: lengthen them, or rest nearer to this value",
+    )]
 }
 
 /// Strings that would have to push.
@@ -318,8 +313,11 @@ fn slack(design: &Design, model: &Model, cycle: &Cycle) -> Vec<Diagnostic> {
 /// What a followed cycle says about itself.
 fn judge(design: &Design, layout: &Layout, cycle: &Cycle) -> Vec<Diagnostic> {
     let mut found = Vec::new();
-    let saddles: Vec<String> =
-        cycle.states.iter().enumerate().filter(|(_, e)| !e.stable).map(|(s, _)| s.to_string()).collect();
+    let saddle = |(s, e): (usize, &Equilibrium)| {
+        let drives: Vec<f64> = layout.drives.iter().map(|d| d.values[s]).collect();
+        (!e.stable).then(|| format!("{s} ({})", stability::shown(design, &drives)))
+    };
+    let saddles: Vec<String> = cycle.states.iter().enumerate().filter_map(saddle).collect();
     if !saddles.is_empty() {
         let message =
             format!("the mechanism would buckle: no stable equilibrium at state {}", saddles.join(", "));

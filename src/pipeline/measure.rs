@@ -40,6 +40,7 @@ pub fn measure(design: &Design, simulation: &Simulation) -> Measures {
     let stress = series(simulation, &Quantity::Stress);
     let max_mpa = if design.rods.is_empty() { None } else { aggregate(&stress, Aggregate::Max, closed) };
     measures.stress = StressMeasures { max_mpa };
+    measures.stability = simulation.stability.clone();
     measures.gap = GapMeasures { least_mm: aggregate(&simulation.gaps_mm, Aggregate::Min, closed) };
     measures
 }

@@ -7,6 +7,7 @@ mod measure;
 mod progress;
 mod report;
 mod solids;
+mod stability;
 mod stages;
 
 pub use aims::{AimSeries, DirectionMeasures, OutputMeasures};
@@ -17,6 +18,7 @@ pub use report::{
     Artefact, BuildOutcome, DriveMeasures, GapMeasures, Measures, Origin, RequirementResult, Seconds,
     StressMeasures, TraceMeasures,
 };
+pub use stability::{DriveValues, LimitPoint, RestState, SnapThrough, Stability};
 pub use stages::{Checked, Failed, Simulation, Solved, Stages};
 
 use crate::diagnostic::{Diagnostic, Severity};

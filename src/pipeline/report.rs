@@ -1,6 +1,7 @@
 //! What a build tells: the numbers before and after, what was required, what was made, how long it took.
 
 use super::aims::{DirectionMeasures, OutputMeasures};
+use super::stability::Stability;
 use crate::diagnostic::{Diagnostic, SourceMap};
 use crate::ir::{Design, Solution};
 use serde::Serialize;
@@ -23,6 +24,8 @@ pub struct Measures {
     pub stress: StressMeasures,
     /// Between moving solids.
     pub gap: GapMeasures,
+    /// With the drives released.
+    pub stability: Stability,
 }
 
 /// A trace against its target: the place of the same time, or where it is tracked by form only, the nearest one.

@@ -4,6 +4,7 @@
 use super::aims::AimSeries;
 use super::progress::Iteration;
 use super::report::Artefact;
+use super::stability::Stability;
 use crate::diagnostic::{Diagnostic, SourceMap};
 use crate::elaborate::Files;
 use crate::emit::csv::MotionTable;
@@ -35,6 +36,8 @@ pub struct Simulation {
     pub aims: AimSeries,
     /// Least gap of the printed solids at every state, mm; empty where there is nothing to compare.
     pub gaps_mm: Vec<f64>,
+    /// What the released mechanism does.
+    pub stability: Stability,
     /// Findings that do not stop the work.
     pub diagnostics: Vec<Diagnostic>,
 }

@@ -27,7 +27,7 @@ pub struct RodSystem {
     pub(crate) measures: Vec<VertexMeasures>,
     pub(crate) edge_gradient: Vec<Local>,
     pub(crate) edge_hessian: Vec<Block>,
-    mixed: Vec<Block>,
+    pub(crate) mixed: Vec<Block>,
     /// Axial force EA ε per edge, N.
     pub(crate) axial_force: Vec<f64>,
     pub(crate) gradient: Vec<f64>,
@@ -220,7 +220,8 @@ impl RodSystem {
         }
         for i in 1..n {
             let measures = VertexMeasures::new(&self.frames[i - 1], &self.frames[i]);
-            let term = measures.energy(&rod.vertex_stiffness[i], &rod.rest_measures[i]);
+            let more = self.wagner_twisting(rod, i, &measures);
+            let term = measures.energy(&rod.vertex_stiffness[i], &rod.rest_measures[i], &more);
             self.measures[i] = measures;
             self.energy += term.energy;
             add_local(&mut self.edge_gradient[i - 1], &term.g_before);
@@ -228,6 +229,7 @@ impl RodSystem {
             add_block(&mut self.edge_hessian[i - 1], &term.before);
             add_block(&mut self.edge_hessian[i], &term.after);
             self.mixed[i] = term.mixed;
+            self.wagner_stretch(rod, i);
         }
     }
 
@@ -371,6 +373,7 @@ impl Rod {
                 for ((v, r), b) in values.iter().zip(&self.rest_measures[j]).zip(&self.vertex_stiffness[j]) {
                     energy += 0.5 * b * (v - r) * (v - r);
                 }
+                energy += self.wagner_energy(j, values[2], [p.l, frame.l]);
             }
             if let Some(c) = self.shear.get(j) {
                 energy += 0.5 * c * frame.t.dot(&state.force).powi(2);

@@ -68,6 +68,7 @@ pub mod single;
 mod state;
 mod stencil;
 mod stress;
+mod wagner;
 mod weight;
 
 pub use crate::ir::RodModel;
@@ -113,6 +114,8 @@ pub struct Rod {
     sections: Vec<[f64; 2]>,
     /// Shear compliance per edge, mm/N; empty without shear.
     shear: Vec<f64>,
+    /// [`wagner::Form`] per vertex (entry 0 unused); empty without Wagner's strain.
+    wagner: Vec<wagner::Form>,
     /// Of a rectangle, γ² per twist rate at the boundary points with its derivatives by a and b: once, of a
     /// tapered rod per station. Empty for ellipses.
     torsion: Vec<[[f64; 3]; SECTION_POINTS]>,
@@ -205,6 +208,7 @@ impl Rod {
                 [s.ei1 + r.ei1, s.ei2 + r.ei2, s.gj + r.gj].map(|x| 0.5 * x / shape.voronoi[i])
             })
             .collect();
+        let wagner_lengths = shape.voronoi.clone();
         let stretch_lengths =
             shape.edge_lengths.iter().enumerate().map(|(j, l)| l * stretch_factor(j, edges)).collect();
         Ok(Self {
@@ -227,6 +231,7 @@ impl Rod {
             vertex_stiffness,
             sections: shape.sections,
             shear: shape.shear,
+            wagner: wagner::forms(&shape.polar, &wagner_lengths),
             torsion,
             derivatives: None,
         })

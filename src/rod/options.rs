@@ -32,7 +32,7 @@ impl RodModel {
     /// Its corrections.
     pub fn corrections(self) -> Corrections {
         let all = self == Self::Corrected;
-        Corrections { shear: all, width: all, warping: all }
+        Corrections { shear: all, width: all, warping: all, wagner: all }
     }
 }
 
@@ -45,6 +45,8 @@ pub struct Corrections {
     pub width: bool,
     /// Hindered warping: GJ/(1 − k w/L).
     pub warping: bool,
+    /// Fibres off the axis stretch when the rod twists (Wagner): strain + ½(τ² − τ̄²) r².
+    pub wagner: bool,
 }
 
 /// What a rod is besides its parameters and material.

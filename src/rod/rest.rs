@@ -186,6 +186,8 @@ pub(crate) struct RestShape<T> {
     /// Shear compliance per edge, mm/N: its length between the attachment planes over k_s G A. Empty
     /// without shear.
     pub shear: Vec<T>,
+    /// E ∫r² dA and E ∫r⁴ dA per edge. Empty without Wagner's strain.
+    pub polar: Vec<[T; 2]>,
 }
 
 /// A cubic Hermite curve.
@@ -373,6 +375,10 @@ pub(crate) fn rest_shape<T: Real>(
         let edges = edge_lengths.iter().zip(&stiffness).enumerate();
         shear.extend(edges.map(|(j, (l, s))| l.scale(part(j)) / s.ea.scale(factor)));
     }
+    let mut polar = Vec::new();
+    if options.corrections.wagner {
+        polar.extend(sections.iter().map(|[a, b]| options.section.polar_moments(*a, *b, material)));
+    }
     Ok(RestShape {
         length,
         m1: frames.iter().map(|f| f[0]).collect(),
@@ -383,6 +389,7 @@ pub(crate) fn rest_shape<T: Real>(
         stiffness,
         sections,
         shear,
+        polar,
     })
 }
 

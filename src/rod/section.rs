@@ -74,6 +74,18 @@ impl SectionShape {
         }
     }
 
+    /// E ∫r² dA and E ∫r⁴ dA, N·mm² and N·mm⁴, r from the centre.
+    pub(crate) fn polar_moments<T: Real>(self, a: T, b: T, material: &RodMaterial) -> [T; 2] {
+        let (a2, b2) = (a * a, b * b);
+        let (area, square, fourth, mixed) = match self {
+            Self::Ellipse => (PI, 0.25, 0.125, 1.0 / 12.0),
+            Self::Rectangle => (4.0, 1.0 / 3.0, 0.2, 2.0 / 9.0),
+        };
+        let ea = (a * b).scale(area * material.e_mpa);
+        let polar = ea * (a2 + b2).scale(square);
+        [polar, ea * ((a2 * a2 + b2 * b2).scale(fourth) + (a2 * b2).scale(mixed))]
+    }
+
     /// Boundary point `k` of [`SECTION_POINTS`], in half widths: (x/a, y/b). Both axes are hit, and the
     /// rectangle's corners (k = 4, 12, 20, 28) with equal steps along each side between them.
     pub fn boundary(self, k: usize) -> (f64, f64) {

@@ -238,11 +238,21 @@ impl RodSystem {
         for i in 1..n {
             let measures = &self.measures[i];
             let (s0, s1, v) = (&rest.stiffness[i - 1], &rest.stiffness[i], rest.voronoi[i]);
+            let (head, tail) = local.split_at_mut(i);
+            let wagner = match (head.last_mut(), tail.first_mut()) {
+                (Some(before), Some(after)) => {
+                    self.wagner_columns(rod, rest, i, [&mut before[2], &mut after[2]])
+                }
+                _ => [0.0; PARAMETERS],
+            };
             for (f, sum) in [s0.ei1 + s1.ei1, s0.ei2 + s1.ei2, s0.gj + s1.gj].into_iter().enumerate() {
                 let b = sum / (v + v);
                 let mut dm = [0.0; PARAMETERS];
                 add_scaled(&mut dm, measures.value[f] - rod.rest_measures[i][f], &b.eps);
                 add_scaled(&mut dm, -b.re, &rest.measures[i][f].eps);
+                if f == 2 {
+                    add_scaled(&mut dm, 1.0, &wagner);
+                }
                 for (edge, gradient) in [(i - 1, &measures.before[f]), (i, &measures.after[f])] {
                     for (row, g) in local[edge].iter_mut().zip(gradient) {
                         add_scaled(row, *g, &dm);

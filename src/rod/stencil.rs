@@ -69,6 +69,14 @@ pub(crate) struct VertexEnergy {
     pub mixed: Block,
 }
 
+/// Energy of a vertex beyond ½ΣB(f − f̄)², a function of its twist, with its first and second derivative by it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Twisting {
+    pub energy: f64,
+    pub moment: f64,
+    pub tangent: f64,
+}
+
 impl VertexMeasures {
     pub(crate) const ZERO: Self = Self {
         value: [0.0; 3],
@@ -106,11 +114,14 @@ impl VertexMeasures {
         Self { value: [k1, k2, sine.atan2(cosine)], before, after, chi, d, twist: [cosine * r, sine * r] }
     }
 
-    /// Energy ½ΣB(f − f̄)² of this vertex with its derivatives; `b` are EI₁/l̄, EI₂/l̄, GJ/l̄.
+    /// Energy ½ΣB(f − f̄)² of this vertex, and `more` of its twist, with their derivatives; `b` are EI₁/l̄, EI₂/l̄,
+    /// GJ/l̄.
     #[inline]
-    pub(crate) fn energy(&self, b: &[f64; 3], rest: &[f64; 3]) -> VertexEnergy {
-        let m: [f64; 3] = std::array::from_fn(|i| b[i] * (self.value[i] - rest[i]));
-        let energy = 0.5 * (0..3).map(|i| m[i] * (self.value[i] - rest[i])).sum::<f64>();
+    pub(crate) fn energy(&self, b: &[f64; 3], rest: &[f64; 3], more: &Twisting) -> VertexEnergy {
+        let mut m: [f64; 3] = std::array::from_fn(|i| b[i] * (self.value[i] - rest[i]));
+        let energy = 0.5 * (0..3).map(|i| m[i] * (self.value[i] - rest[i])).sum::<f64>() + more.energy;
+        m[2] += more.moment;
+        let b = &[b[0], b[1], b[2] + more.tangent];
         let sum = |g: &[Local; 3]| -> Local {
             std::array::from_fn(|i| m[0] * g[0][i] + m[1] * g[1][i] + m[2] * g[2][i])
         };

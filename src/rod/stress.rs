@@ -5,7 +5,7 @@
 //! twice), fibres are measured by their own rest length (1 − κ̄·c), and the attachment planes, where the
 //! largest stress sits but no vertex, are reached by linear extrapolation of the strain measures.
 //!
-//! ε_z(c) = (ε_cl − (κ − κ̄)·c)/(1 − κ̄·c), twist by St Venant's warping (of the ellipse ψ = (b² − a²)/(a² + b²) xy),
+//! ε_z(c) = (ε_cl − (κ − κ̄)·c + ½(τ² − τ̄²)|c|²)/(1 − κ̄·c), the last term only with Wagner's strain, twist by St Venant's warping (of the ellipse ψ = (b² − a²)/(a² + b²) xy),
 //! and σ_v² = (Eε_z)² + 3σ_s². Transverse shear is left out: it vanishes where bending is largest.
 
 use super::assemble::{FIRST_INTERNAL, RodSystem, end_coordinates, slot_signs};
@@ -39,6 +39,8 @@ pub struct StationStrain {
     pub a: f64,
     /// Half width along m₂, mm.
     pub b: f64,
+    /// Whether fibres stretch by ½(τ² − τ̄²) r² ([`Corrections::wagner`](super::Corrections::wagner)).
+    pub wagner: bool,
 }
 
 /// Stress at one point of a section.
@@ -55,9 +57,9 @@ pub struct StressSample {
 }
 
 impl StationStrain {
-    fn from_values(v: [f64; STATION_VALUES]) -> Self {
+    fn from_values(v: [f64; STATION_VALUES], wagner: bool) -> Self {
         let [stretch, kappa1, kappa2, twist, rest_kappa1, rest_kappa2, rest_twist, a, b] = v;
-        Self { stretch, kappa1, kappa2, twist, rest_kappa1, rest_kappa2, rest_twist, a, b }
+        Self { stretch, kappa1, kappa2, twist, rest_kappa1, rest_kappa2, rest_twist, a, b, wagner }
     }
 
     fn values(&self) -> [f64; STATION_VALUES] {
@@ -77,7 +79,13 @@ impl StationStrain {
     /// Axial strain ε_z at c = (x along m₁, y along m₂), mm.
     pub fn axial_strain(&self, x: f64, y: f64) -> f64 {
         let change = (self.kappa1 - self.rest_kappa1) * x + (self.kappa2 - self.rest_kappa2) * y;
-        (self.stretch - change) / (1.0 - self.rest_kappa1 * x - self.rest_kappa2 * y)
+        let helix = if self.wagner { self.helix() * (x * x + y * y) } else { 0.0 };
+        (self.stretch - change + helix) / (1.0 - self.rest_kappa1 * x - self.rest_kappa2 * y)
+    }
+
+    /// ½(τ² − τ̄²), 1/mm².
+    fn helix(&self) -> f64 {
+        0.5 * (self.twist * self.twist - self.rest_twist * self.rest_twist)
     }
 
     /// Engineering shear strains (γ_xz, γ_yz) of an elliptic section at (x, y), mm.
@@ -131,11 +139,18 @@ impl StationStrain {
         d[5] = w * y * (1.0 + strain);
         d[7] = w * c * (strain * self.rest_kappa1 - (self.kappa1 - self.rest_kappa1));
         d[8] = w * s * (strain * self.rest_kappa2 - (self.kappa2 - self.rest_kappa2));
+        if self.wagner {
+            let r2 = x * x + y * y;
+            d[3] = w * self.twist * r2;
+            d[6] = -w * self.rest_twist * r2;
+            d[7] += 2.0 * w * self.helix() * x * c;
+            d[8] += 2.0 * w * self.helix() * y * s;
+        }
         if let Some([form, by_a, by_b]) = &point.shear {
             let rate = self.twist - self.rest_twist;
             let k = 3.0 * g * g * rate / mises;
-            d[3] = k * form;
-            d[6] = -d[3];
+            d[3] += k * form;
+            d[6] -= k * form;
             d[7] += 0.5 * k * rate * by_a;
             d[8] += 0.5 * k * rate * by_b;
             return (mises, d);
@@ -148,8 +163,9 @@ impl StationStrain {
         let form = a2 * s * s + b2 * c * c;
         let k = 6.0 * g * g / mises;
         let base = a2 * b2 / (sum * sum);
-        d[3] = k * 2.0 * rate * base * form;
-        d[6] = -d[3];
+        let by_rate = k * 2.0 * rate * base * form;
+        d[3] += by_rate;
+        d[6] -= by_rate;
         let r2 = k * rate * rate;
         d[7] += r2 * (2.0 * a * b2 / (sum * sum) * form * (1.0 - 2.0 * a2 / sum) + base * 2.0 * a * s * s);
         d[8] += r2 * (2.0 * b * a2 / (sum * sum) * form * (1.0 - 2.0 * b2 / sum) + base * 2.0 * b * c * c);
@@ -288,7 +304,7 @@ impl RodSystem {
             ];
         }
         extrapolate(&mut values);
-        values.into_iter().map(StationStrain::from_values).collect()
+        values.into_iter().map(|v| StationStrain::from_values(v, rod.options.corrections.wagner)).collect()
     }
 
     /// Derivatives of the strain measures of the last assembled equilibrium by the rod's own 31 directions:

@@ -3,7 +3,7 @@
 //! ```text
 //! # flexura lock 1
 //! design sha256:…         key: digest of the elaborated design
-//! solver 2                a solver that would find another optimum counts as another design
+//! solver 3                a solver that would find another optimum counts as another design
 //! values sha256:…         digest of the entries: notices an edit or a bad merge
 //! iterations 23
 //! converged true
@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Raised whenever the solver would find something else for the same design.
-pub const SOLVER_VERSION: &str = "2";
+pub const SOLVER_VERSION: &str = "3";
 const TITLE: &str = "# flexura lock 1";
 
 /// How a damaged lock is mended; said with every error of this file.
