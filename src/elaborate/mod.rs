@@ -3,21 +3,26 @@
 //! Everything that can be wrong with a text is said here, with its place; the numerical stages see
 //! only the design. No I/O: files come in through [`Files`].
 
+mod aims;
 mod arithmetic;
 mod check;
 pub mod codes;
 pub mod dimension;
 mod drives;
 mod eval;
+mod forms;
 mod frames;
 mod free;
 mod functions;
 mod goals;
 mod graph;
 mod load;
+mod loads;
 mod lookup;
 mod mechanism;
+mod members;
 mod names;
+mod places;
 mod profiles;
 mod records;
 mod require;
@@ -25,7 +30,9 @@ mod scope;
 mod settings;
 mod sheet;
 mod structure;
+mod table;
 mod taper;
+mod targets;
 mod template;
 mod terms;
 mod theory;
@@ -116,7 +123,7 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
     };
     let (root_index, root_module) = module;
     let mut evaluator = eval::Evaluator::new(&program, &settings);
-    let outside = mechanism::Outside { module: root_index, steps: options.steps, sources: &sources };
+    let outside = mechanism::Outside { module: root_index, steps: options.steps, sources: &sources, files };
     let mut mechanisms: Vec<_> = root_module
         .file
         .items

@@ -9,6 +9,7 @@ use crate::rod::{
     SectionShape,
 };
 use nalgebra::{DMatrix, Vector3};
+use std::borrow::Cow;
 
 /// A rod between two bodies.
 #[derive(Clone, Debug)]
@@ -24,10 +25,12 @@ pub struct ModelRod {
 /// The model at given parameters.
 #[derive(Clone, Debug)]
 pub struct Model<'l> {
-    /// What does not depend on the parameters.
-    pub layout: &'l Layout,
+    /// What the rods are put into.
+    pub layout: Cow<'l, Layout>,
     /// One per flexure.
     pub rods: Vec<ModelRod>,
+    /// The design parameters.
+    pub p: Vec<f64>,
 }
 
 /// A flexure whose parameters make no rod.
@@ -50,6 +53,8 @@ pub struct State {
     pub lambda: Vec<f64>,
     /// Drive values relative to rest, unwrapped, rad or mm.
     pub drives: Vec<f64>,
+    /// Turn that each load works on, unwrapped, rad; zero for loads that are no moments.
+    pub turns: Vec<f64>,
 }
 
 /// How a section of the language is modelled: wires carry frames that need no joint axis.
@@ -70,11 +75,12 @@ impl<'l> Model<'l> {
     /// The first flexure whose rest shape is degenerate.
     pub fn new(
         design: &Design,
-        layout: &'l Layout,
+        layout: impl Into<Cow<'l, Layout>>,
         p: &[f64],
         edges: usize,
         derivatives: bool,
     ) -> Result<Self, ModelError> {
+        let layout: Cow<'l, Layout> = layout.into();
         let values = design.exprs.evaluate(p);
         let material = RodMaterial { e_mpa: design.material.e_mpa, nu: design.material.nu };
         let mut rods = Vec::with_capacity(design.rods.len());
@@ -99,6 +105,18 @@ impl<'l> Model<'l> {
             for c in 0..3 {
                 q[12 + c] = ends[0].axes[(c, 2)];
             }
+            for change in layout.changes.iter().flatten() {
+                let mut column = dq_dp.column_mut(change.parameter);
+                for (k, (end, moved)) in
+                    [&rod.from, &rod.to].into_iter().zip(&change.rod_ends[index]).enumerate()
+                {
+                    let mut position = column.fixed_rows_mut::<3>(6 * k);
+                    position += moved.origin + moved.axes * values.point(end.position);
+                    let mut derivative = column.fixed_rows_mut::<3>(6 * k + 3);
+                    derivative += moved.axes * values.point(end.derivative);
+                }
+                column.fixed_rows_mut::<3>(12).copy_from(&change.rod_ends[index][0].axes.column(2));
+            }
             let [a, b] = rod.section.half_widths();
             let [a_to, b_to] = rod.section_to.as_ref().unwrap_or(&rod.section).half_widths();
             for (row, id) in [(15, a), (16, b), (17, a_to), (18, b_to)] {
@@ -113,7 +131,7 @@ impl<'l> Model<'l> {
                 .map_err(|error| ModelError { rod: index, error })?;
             rods.push(ModelRod { rod: built, bodies: [rod.from.body, rod.to.body], dq_dp });
         }
-        Ok(Self { layout, rods })
+        Ok(Self { layout, rods, p: p.to_vec() })
     }
 
     /// The unstressed rest state.
@@ -123,6 +141,7 @@ impl<'l> Model<'l> {
             rods: self.rods.iter().map(|r| r.rod.rest_state()).collect(),
             lambda: vec![0.0; self.rows()],
             drives: vec![0.0; self.layout.drives.len()],
+            turns: vec![0.0; self.layout.loads.len()],
         }
     }
 

@@ -1,6 +1,7 @@
 //! The whole way from text to artefacts, as one function to be read from top to bottom. No I/O here:
 //! files come in through [`Files`], artefacts go out as names and bytes, time and threads come from outside.
 
+mod aims;
 mod compiler;
 mod measure;
 mod progress;
@@ -9,6 +10,7 @@ mod solids;
 mod stability;
 mod stages;
 
+pub use aims::{AimSeries, DirectionMeasures, OutputMeasures};
 pub use compiler::{Compiler, EDGES};
 pub use measure::{aggregate, check_requirements, is_closed, measure};
 pub use progress::{Iteration, Progress, Stage};
@@ -110,7 +112,7 @@ fn run_build(
     }
     clock.stop(&mut out.seconds.mesh);
     let clock = Clock::start(progress, Stage::Emit);
-    emit_sketches(&design, out);
+    emit_sketches(&design, &values, out);
     clock.stop(&mut out.seconds.emit);
     Some(())
 }
@@ -131,10 +133,11 @@ pub fn simulate(
 ) -> (BuildOutcome, Option<Simulation>) {
     let mut out = BuildOutcome::default();
     let simulation = front_end(request, stages, files, &mut out).and_then(|design| {
-        let result = if show.rigid {
-            stages.rigid(&design)
+        let start = Solution { values: start_of(&design), ..Solution::default() };
+        // Where nothing of the geometry is free, the conventional motion needs no lock.
+        let result = if show.rigid && design.geometry_variables().is_empty() {
+            stages.rigid(&design, &values_of(&design, &start))
         } else {
-            let start = Solution { values: start_of(&design), ..Solution::default() };
             let solution = match read_lock(request, &design, &mut out) {
                 Ok(Some((lock, LockState::Current))) => lock.solution,
                 Ok(_) if request.frozen => {
@@ -144,7 +147,8 @@ pub fn simulate(
                 Ok(_) => start,
                 Err(()) => return None,
             };
-            stages.simulate(&design, &values_of(&design, &solution))
+            let values = values_of(&design, &solution);
+            if show.rigid { stages.rigid(&design, &values) } else { stages.simulate(&design, &values) }
         };
         let mut simulation = keep(result, &mut out.diagnostics)?;
         if !show.rigid {
@@ -172,8 +176,9 @@ fn front_end(
         return None;
     }
     let design = checked.design?;
+    let starts: Vec<f64> = design.free.iter().map(|v| v.start).collect();
     // That it can be assembled all the way is part of being right.
-    let rigid = keep(stages.rigid(&design), &mut out.diagnostics)?;
+    let rigid = keep(stages.rigid(&design, &starts), &mut out.diagnostics)?;
     out.diagnostics.extend(rigid.diagnostics);
     out.design = Some(design.clone());
     Some(design)
@@ -270,10 +275,10 @@ fn frozen(design: &Design, request: &Request) -> Diagnostic {
     Diagnostic::error("E0710", message, design.origin).help("build without `--frozen` and keep the new lock")
 }
 
-fn emit_sketches(design: &Design, out: &mut BuildOutcome) {
+fn emit_sketches(design: &Design, values: &[f64], out: &mut BuildOutcome) {
     for export in &design.exports {
         let ExportKind::Arduino(drive) = export.kind else { continue };
-        match Sketch::of(design, drive).and_then(|s| Ok((s.name(), s.render()?))) {
+        match Sketch::of(design, drive, values).and_then(|s| Ok((s.name(), s.render()?))) {
             Ok((name, text)) => {
                 out.artefacts.push(Artefact { name: format!("{name}/{name}.ino"), bytes: text.into_bytes() })
             }

@@ -38,6 +38,7 @@ fn design() -> Design {
             unit: DriveUnit::Rad,
             profile: Profile::Range { from: 0.0, to: std::f64::consts::TAU },
             rest: 0.0,
+            free_rest: None,
             motor: Some(Motor {
                 name: "m".into(),
                 interface: MotorInterface::Stepper { steps_per_turn: 200, microsteps: 8 },
@@ -47,8 +48,10 @@ fn design() -> Design {
             continuous: true,
             origin,
         }],
+        loads: Vec::new(),
         cycle: Cycle { steps: 4, duration_s: 2.0, origin },
         traces: vec![Trace { name: "tip".into(), body: 0, point: [zero; 3], origin }],
+        aims: Default::default(),
         objectives: vec![Objective {
             kind: ObjectiveKind::Track { trace: 0, scale_mm: None },
             weight: 1.0,
@@ -102,7 +105,7 @@ impl Stages for Toy {
         Checked { sources, design: Some(design), diagnostics: Vec::new() }
     }
 
-    fn rigid(&self, design: &Design) -> Result<Simulation, Failed> {
+    fn rigid(&self, design: &Design, _: &[f64]) -> Result<Simulation, Failed> {
         let states = vec![MotionState::default(); design.cycle.steps + 1];
         Ok(Simulation { motion: MotionTable { states, ..Default::default() }, ..Default::default() })
     }

@@ -42,7 +42,7 @@
 //! Per iteration: [`RodSystem::assemble`], [`RodSystem::factor`], [`RodSystem::condense`], solve for the
 //! links, [`RodSystem::back_substitute`], [`Rod::retract`]. At an equilibrium of a rod made by
 //! [`Rod::with_derivatives`]: [`RodSystem::parameter_columns`], [`RodSystem::internal_sensitivity`] (or, transposed,
-//! [`RodSystem::internal_pull_back`]), [`RodSystem::strain_jacobian`].
+//! [`RodSystem::internal_pull_back`]), [`RodSystem::strain_jacobian`], [`RodSystem::centreline_jacobian`].
 //!
 //! # Options
 //!
@@ -52,6 +52,7 @@
 //! for the caller.
 
 mod assemble;
+mod centreline;
 mod condense;
 #[cfg(test)]
 mod derivative_tests;
@@ -68,9 +69,11 @@ mod state;
 mod stencil;
 mod stress;
 mod wagner;
+mod weight;
 
 pub use crate::ir::RodModel;
 pub use assemble::RodSystem;
+pub use centreline::CentrelineJacobian;
 pub use condense::FactorReport;
 pub use options::{Corrections, RestFrames, RodOptions};
 pub use rest::{MIN_EDGES, PARAMETERS, RodError, RodParameters};

@@ -59,9 +59,9 @@ impl std::fmt::Display for SensitivityError {
 
 impl std::error::Error for SensitivityError {}
 
-type Row = [f64; PARAMETERS];
+pub(crate) type Row = [f64; PARAMETERS];
 
-fn add_scaled(to: &mut Row, s: f64, from: &Row) {
+pub(crate) fn add_scaled(to: &mut Row, s: f64, from: &Row) {
     for (t, f) in to.iter_mut().zip(from) {
         *t += s * f;
     }
@@ -234,6 +234,7 @@ impl RodSystem {
                 add_scaled(&mut local[1], along * f.m2.dot(&shear.force), &c.eps);
             }
         }
+        self.weight_columns(rod, rest, &mut out);
         for i in 1..n {
             let measures = &self.measures[i];
             let (s0, s1, v) = (&rest.stiffness[i - 1], &rest.stiffness[i], rest.voronoi[i]);

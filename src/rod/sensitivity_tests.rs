@@ -105,7 +105,7 @@ fn cantilever(q: &RodParameters, options: RodOptions) -> SingleRod {
     s
 }
 
-/// All results that must have the right derivatives: inner vertices, frames, pose of B, stresses.
+/// All results that must have the right derivatives: vertices, pose of B, stresses, wide directions.
 fn results(s: &SingleRod) -> Vec<f64> {
     let mut out = Vec::new();
     for v in &s.state.vertices {
@@ -114,6 +114,9 @@ fn results(s: &SingleRod) -> Vec<f64> {
     out.extend_from_slice(s.pose_b.translation.as_slice());
     for row in s.rod.stresses(&s.system.strains(&s.rod)) {
         out.extend_from_slice(&row);
+    }
+    for (x, m1) in s.state.vertices.windows(2).zip(&s.state.m1) {
+        out.extend_from_slice((x[1] - x[0]).normalize().cross(m1).as_slice());
     }
     out
 }
@@ -134,17 +137,22 @@ fn check(build: impl Fn(&RodParameters) -> SingleRod, free: bool) {
         d_link.rows_mut(6, 6).copy_from(&d);
     }
     let d_internal = s.system.internal_sensitivity(&d_link, &dq).unwrap();
+    let centreline = s.system.centreline_jacobian(&s.rod, &d_link, &dq).unwrap();
     let derivatives = s.system.strain_jacobian(&s.rod).unwrap();
     let edges = s.rod.edges();
     let stations = edges + 1;
     let base = results(&s);
     for k in 0..PARAMETERS {
         let mut want = Vec::new();
-        // Inner vertices only: those the ends carry are not internal.
         for j in 2..=edges - 2 {
             for c in 0..3 {
-                want.push((3 * j + c, d_internal[(4 * j - 7 + c, k)]));
+                let inner = d_internal[(4 * j - 7 + c, k)];
+                assert!((inner - centreline.vertices[j][(c, k)]).abs() <= 1e-12 * inner.abs());
             }
+        }
+        let frames = base.len() - 3 * edges;
+        for c in 0..3 {
+            want.extend((0..=edges).map(|j| (3 * j + c, centreline.vertices[j][(c, k)])));
         }
         let pose = 3 * (edges + 1);
         for c in 0..3 {
@@ -159,20 +167,28 @@ fn check(build: impl Fn(&RodParameters) -> SingleRod, free: bool) {
                 want.push((at, d.link.dot(&d_link.fixed_view::<12, 1>(0, k)) + d.parameters[k]));
             }
         }
+        let turned: Vec<(usize, f64)> = (0..edges)
+            .flat_map(|j| (0..3).map(move |c| (j, c)))
+            .map(|(j, c)| (frames + 3 * j + c, centreline.m2[j][(c, k)]))
+            .collect();
         let dq = step_of(k);
         let samples: Vec<Vec<f64>> =
             [-2.0, -1.0, 1.0, 2.0].map(|s| results(&build(&shifted(&q0, k, s * dq * 0.25)))).to_vec();
+        let slope = |at: usize| {
+            (8.0 * (samples[2][at] - samples[1][at]) - (samples[3][at] - samples[0][at])) / (12.0 * dq * 0.25)
+        };
+        let largest = turned.iter().map(|(_, got)| got.abs()).fold(1e-3, f64::max);
+        let turn = turned.iter().map(|(at, got)| (got - slope(*at)).abs() / largest).fold(0.0, f64::max);
+        assert!(turn < 1e-6, "q{k}: {turn:e}");
         let mut worst = [0.0f64; 2];
         let mut scale = [0.0f64; 2];
         for (at, _) in &want {
-            let d = (8.0 * (samples[2][*at] - samples[1][*at]) - (samples[3][*at] - samples[0][*at]))
-                / (12.0 * dq * 0.25);
+            let d = slope(*at);
             let kind = usize::from(*at >= stress);
             scale[kind] = scale[kind].max(d.abs());
         }
         for (at, got) in &want {
-            let d = (8.0 * (samples[2][*at] - samples[1][*at]) - (samples[3][*at] - samples[0][*at]))
-                / (12.0 * dq * 0.25);
+            let d = slope(*at);
             let kind = usize::from(*at >= stress);
             worst[kind] = worst[kind].max((got - d).abs() / scale[kind]);
         }

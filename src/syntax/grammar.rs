@@ -88,6 +88,8 @@ fn is_weak(rule: Rule) -> bool {
             | Rule::unit_power
             | Rule::dot
             | Rule::lparen
+            | Rule::kw_about
+            | Rule::kw_direction
     )
 }
 
@@ -132,6 +134,10 @@ fn words(rule: Rule) -> String {
         Rule::rod_from => "`from`",
         Rule::rod_to => "`to`",
         Rule::rod_section => "`section`",
+        Rule::rod_axis => "`axis`",
+        Rule::load_gravity => "`gravity`",
+        Rule::load_moment => "`moment`",
+        Rule::load_force => "a value",
         other => {
             // Keyword rules are called after their keyword.
             let name = format!("{other:?}");
@@ -236,6 +242,8 @@ fn kind(rule: Rule) -> Kind {
         Rule::drum => Kind::Drum,
         Rule::st_rest => Kind::Rest,
         Rule::st_trace => Kind::Trace,
+        Rule::st_output => Kind::Output,
+        Rule::st_target => Kind::Target,
         Rule::st_minimize => Kind::Minimize,
         Rule::term => Kind::Term,
         Rule::st_require => Kind::Require,
@@ -245,6 +253,12 @@ fn kind(rule: Rule) -> Kind {
         Rule::rod_from => Kind::RodFrom,
         Rule::rod_to => Kind::RodTo,
         Rule::rod_section => Kind::RodSection,
+        Rule::rod_axis => Kind::RodAxis,
+        Rule::st_own => Kind::OwnBody,
+        Rule::st_load => Kind::Load,
+        Rule::load_gravity => Kind::Gravity,
+        Rule::load_moment => Kind::Moment,
+        Rule::load_force => Kind::Force,
         Rule::st_later => Kind::Later,
         Rule::value => Kind::Value,
         Rule::free => Kind::Free,
@@ -255,6 +269,7 @@ fn kind(rule: Rule) -> Kind {
         Rule::tuple => Kind::Tuple,
         Rule::call => Kind::Call,
         Rule::argument => Kind::Argument,
+        Rule::about => Kind::About,
         Rule::name => Kind::Name,
         Rule::number => Kind::Number,
         Rule::unit => Kind::Unit,

@@ -131,6 +131,13 @@ pub fn design_digest(design: &Design) -> String {
     if let Value::Object(fields) = &mut value {
         fields.remove("exports");
         fields.remove("requirements");
+        // Angles are only looked at.
+        if let Some(Value::Object(aims)) = fields.get_mut("aims") {
+            aims.remove("angles");
+            if aims.is_empty() {
+                fields.remove("aims");
+            }
+        }
     }
     let mut canonical = format!("flexura design, solver {SOLVER_VERSION}\n");
     write_canonical(&value, &mut canonical);
