@@ -5,6 +5,7 @@
 //! the barrier is ∫τ dα up to there. Of one drive the states are put in the order of its value, so that a motion to
 //! and fro is one profile, and a whole turn closes it; of several drives only the way of the cycle is looked at.
 
+use super::design_load::LayoutLoad;
 use super::model::Model;
 use super::newton::{Equilibrium, SolveError, Solver};
 use super::sweep::{Cycle, Walker};
@@ -76,9 +77,9 @@ pub fn landscape(model: &Model, cycle: &Cycle) -> Result<Landscape, SolveError> 
     let mut solver = Solver::new(model);
     let drives = model.layout.drives.len();
     let mut out = Landscape::default();
-    // Loads that change on the way leave no potential that belongs to the drives alone.
-    let steady = model.layout.loads.iter().all(|l| l.values.iter().all(|v| Some(v) == l.values.first()));
-    if drives == 0 || cycle.states.len() < 2 || !steady {
+    // Loads that change over the cycle are not a matter of the drives' values alone.
+    let steady = |l: &LayoutLoad| l.values.windows(2).all(|v| v[0] == v[1]);
+    if drives == 0 || cycle.states.len() < 2 || !model.layout.loads.iter().all(steady) {
         return Ok(out);
     }
     let mut tangents = Vec::with_capacity(cycle.states.len());
@@ -96,8 +97,8 @@ pub fn landscape(model: &Model, cycle: &Cycle) -> Result<Landscape, SolveError> 
     Ok(out)
 }
 
-/// Elastic energy and the potential of the loads, N·mm.
-fn potential_n_mm(e: &Equilibrium) -> f64 {
+/// Of rods and loads, N·mm.
+fn potential(e: &Equilibrium) -> f64 {
     e.energy_n_mm + e.load_potential_n_mm
 }
 
@@ -132,30 +133,21 @@ impl<'m, 'l> Path<'m, 'l> {
         Self { model, cycle, order, closed }
     }
 
-    /// Drive values of state `s` relative to rest.
-    fn target(model: &Model, s: usize) -> Vec<f64> {
-        model.layout.drives.iter().map(|d| d.values[s] - d.rest).collect()
-    }
-
-    /// Controls with the drives at these values and the steady loads.
-    fn held(&self, drives: &[f64]) -> Vec<f64> {
-        let loads = self.model.layout.loads.iter().filter_map(|l| l.values.first());
-        drives.iter().chain(loads).copied().collect()
-    }
-
     fn state(&self, k: usize) -> &Equilibrium {
         &self.cycle.states[self.order[k]]
     }
 
-    /// Change of the drives from place `k` to the next.
+    /// Change of the controls from place `k` to the next.
     fn change(&self, k: usize) -> Vec<f64> {
-        let (a, b) = (Self::target(self.model, self.order[k]), Self::target(self.model, self.order[k + 1]));
+        let (a, b) =
+            (self.model.layout.controls(self.order[k]), self.model.layout.controls(self.order[k + 1]));
         b.iter().zip(&a).map(|(b, a)| b - a).collect()
     }
 
     /// Load along `change`: dΠ by the part of it that is gone.
     fn load(&self, e: &Equilibrium, change: &[f64]) -> f64 {
-        change.iter().enumerate().map(|(d, c)| e.drive_load(self.model, d) * c).sum()
+        let drives = self.model.layout.drives.len();
+        change.iter().take(drives).enumerate().map(|(d, c)| e.drive_load(self.model, d) * c).sum()
     }
 
     /// Derivatives of the drives' loads by the drives, row by row, at the state that was solved last.
@@ -168,23 +160,23 @@ impl<'m, 'l> Path<'m, 'l> {
     /// Energy between two states that their loads and the loads' slopes do not account for (Euler–Maclaurin,
     /// error of fifth order in the step).
     fn lost(&self, ends: [(&Equilibrium, &[f64]); 2], change: &[f64]) -> f64 {
-        let n = change.len();
+        let n = self.model.layout.drives.len();
         let slope = |t: &[f64]| -> f64 {
             (0..n * n).map(|i| t.get(i).copied().unwrap_or(0.0) * change[i / n] * change[i % n]).sum()
         };
         let [(a, ta), (b, tb)] = ends;
         let work = 0.5 * (self.load(a, change) + self.load(b, change)) + (slope(ta) - slope(tb)) / 12.0;
-        potential_n_mm(b) - potential_n_mm(a) - work
+        potential(b) - potential(a) - work
     }
 
     /// Steps of the cycle in which energy is lost however finely they are walked.
     fn snaps(&self, solver: &mut Solver, tangents: &[Vec<f64>]) -> Result<Vec<Snap>, SolveError> {
         let states = &self.cycle.states;
-        let energies = || states.iter().map(potential_n_mm);
-        let range = energies().fold(0.0, f64::max) - energies().fold(f64::INFINITY, f64::min);
+        let energies = || states.iter().map(potential);
+        let range = energies().fold(f64::NEG_INFINITY, f64::max) - energies().fold(f64::INFINITY, f64::min);
         let mut out = Vec::new();
         for s in 1..states.len() {
-            let (mut from, to) = (Self::target(self.model, s - 1), Self::target(self.model, s));
+            let (mut from, to) = (self.model.layout.controls(s - 1), self.model.layout.controls(s));
             let mut change: Vec<f64> = to.iter().zip(&from).map(|(b, a)| b - a).collect();
             let mut ends =
                 [(states[s - 1].clone(), tangents[s - 1].clone()), (states[s].clone(), tangents[s].clone())];
@@ -199,12 +191,12 @@ impl<'m, 'l> Path<'m, 'l> {
                 }
                 change.iter_mut().for_each(|c| *c *= 0.5);
                 let half: Vec<f64> = from.iter().zip(&change).map(|(f, c)| f + c).collect();
-                let mut walker = Walker::new(ends[0].0.clone(), self.held(&from));
-                if walker.walk(self.model, solver, s, &self.held(&half)).is_err() {
+                let mut walker = Walker::new(ends[0].0.clone(), from.clone());
+                if walker.walk(self.model, solver, s, &half).is_err() {
                     break;
                 }
                 let middle = walker.into_equilibrium();
-                solver.solve(self.model, middle.state.clone(), &self.held(&half))?;
+                solver.solve(self.model, middle.state.clone(), &half)?;
                 let tangent = Self::tangent(self.model, solver);
                 let halves = [
                     [ends[0].clone(), (middle.clone(), tangent.clone())],
@@ -256,7 +248,7 @@ impl<'m, 'l> Path<'m, 'l> {
                 let (left, right) = (before.map_or(0.0, |l| sign(l[0])), after.map_or(0.0, |l| sign(l[1])));
                 if left != right && left * right <= 0.0 {
                     let minimum = left < 0.0 || right > 0.0;
-                    let target = Self::target(self.model, self.order[k]);
+                    let target = self.model.layout.controls(self.order[k]);
                     let place = self.order[k] as f64;
                     out.push(Found { balance: self.balance(place, &target, self.state(k).clone()), minimum });
                 }
@@ -284,15 +276,15 @@ impl<'m, 'l> Path<'m, 'l> {
         ends: [f64; 2],
         enough: f64,
     ) -> Result<Found, SolveError> {
-        let (from, change) = (Self::target(self.model, self.order[k]), self.change(k));
+        let (from, change) = (self.model.layout.controls(self.order[k]), self.change(k));
         let at = |u: f64| -> Vec<f64> { from.iter().zip(&change).map(|(f, c)| f + u * c).collect() };
-        let mut walker = Walker::new(self.state(k).clone(), self.held(&from));
+        let mut walker = Walker::new(self.state(k).clone(), from.clone());
         let (mut low, mut high) = ((0.0, ends[0]), (1.0, ends[1]));
         let mut u = 0.0;
         let mut side = 0;
         for _ in 0..REFINEMENTS {
             u = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
-            walker.walk(self.model, solver, self.order[k], &self.held(&at(u))).map_err(|e| e.error)?;
+            walker.walk(self.model, solver, self.order[k], &at(u)).map_err(|e| e.error)?;
             let load = self.load(walker.equilibrium(), &change);
             if load.abs() <= enough || high.0 - low.0 <= f64::EPSILON {
                 break;
@@ -319,7 +311,7 @@ impl<'m, 'l> Path<'m, 'l> {
     /// Barriers to both sides: the highest energy on the way to the next rest state.
     fn barriers(&self, found: Vec<Found>, out: &mut Landscape) {
         let count = found.len();
-        let energy = |k: usize| potential_n_mm(&found[k % count].balance.equilibrium);
+        let energy = |k: usize| potential(&found[k % count].balance.equilibrium);
         for (k, f) in found.iter().enumerate().filter(|(_, f)| f.minimum) {
             // Steps to the side until the next minimum, on an open path not beyond its ends.
             let side = |forward: bool| -> Option<f64> {

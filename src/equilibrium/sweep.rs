@@ -74,7 +74,7 @@ pub(super) struct Walker {
 }
 
 impl Walker {
-    /// At an equilibrium with its controls.
+    /// At an equilibrium and the controls it belongs to.
     pub(super) fn new(equilibrium: Equilibrium, controls: Vec<f64>) -> Self {
         Self { equilibrium, controls }
     }
