@@ -8,6 +8,8 @@ use crate::math::{Pose, skew};
 use crate::rod::{RodState, SectionShape};
 use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
 
+/// Simpson's rule on −1..1, weights of sum 1.
+const SIMPSON: [(f64, f64); 3] = [(-1.0, 1.0 / 6.0), (0.0, 4.0 / 6.0), (1.0, 1.0 / 6.0)];
 /// What the outline of a link's fan may recede between its copies, mm …
 const DIP_MM: f64 = 0.06;
 /// … as long as that takes no more copies on either side of the middle.
@@ -70,13 +72,17 @@ impl Strip {
         if self.copies < 2 { 0.0 } else { 2.0 * k as f64 / (self.copies - 1) as f64 - 1.0 }
     }
 
-    /// Places lengthwise, 0..1, with weights of sum one: panels no longer than the capsule is thick.
+    /// Places lengthwise, 0..1, with weights of sum one: of a link to the tips of its axis, in panels no longer than it
+    /// is thick, of a flexure's edge at three points.
     fn samples(&self) -> impl Iterator<Item = (f64, f64)> + use<> {
         let length = (self.ends[1] - self.ends[0]).norm();
-        let panels =
-            if self.capped { ((length / (2.0 * self.radius)).ceil() as usize).clamp(1, 64) } else { 1 };
+        let (panels, rule) = if self.capped {
+            (((length / (2.0 * self.radius)).ceil() as usize).clamp(1, 64), SIMPSON)
+        } else {
+            (1, GAUSS_3)
+        };
         (0..panels).flat_map(move |k| {
-            GAUSS_3.map(|(x, w)| ((k as f64 + 0.5 * (1.0 + x)) / panels as f64, w / panels as f64))
+            rule.map(|(x, w)| ((k as f64 + 0.5 * (1.0 + x)) / panels as f64, w / panels as f64))
         })
     }
 
