@@ -192,10 +192,11 @@ fn measured(design: &Design, layout: &Layout, p: &[f64]) -> (f64, usize) {
     (least, gaps.overlaps.len())
 }
 
-/// The paper's case (Fig. 8): tracking alone lets links collide; with the term they keep their clearance.
+/// The paper's case (Fig. 8): tracking alone lets links collide; with the term they keep their clearance. It is asked
+/// for more than that, because it gives way and knows corners only roughly.
 #[test]
 fn links_that_collide_are_taken_apart() {
-    let (mut design, layout) = crossing(12, 0.5);
+    let (mut design, layout) = crossing(12, 1.0);
     let p = starts(&design);
     let (gap, overlaps) = measured(&design, &layout, &p);
     assert!(gap < 0.0 && overlaps > 0, "{gap} {overlaps}");

@@ -13,9 +13,9 @@ use std::f64::consts::PI;
 const NOTHING_MM: f64 = 1e-9;
 /// Diameters that cover a round end: with six its outline is missed by at most 1 − cos 15°, 3.4 % of the radius.
 const DIAMETERS: usize = 6;
-/// Radius of the thin capsules as a part of the slot's least half width: what they miss of a square corner is
-/// (√2 − 1) of it, less what the corner is rounded.
-const THIN: f64 = 0.3;
+/// Radius of the thin capsules as a part of the slot's least half width, if its edges are not rounded more: what they
+/// miss of a corner is √2 − 1 of the difference.
+const THIN: f64 = 0.2;
 
 /// A fan of capsules of one body in rest coordinates, with first derivatives by the n design parameters.
 ///
@@ -127,8 +127,12 @@ fn add_slot(
         }
     }
     // Thin ones, upright fans along the outline.
-    let (thin, by_thin) =
-        if radius <= half { (THIN * radius, &by_radius * THIN) } else { (THIN * half, &by_half * THIN) };
+    let (least, by_least) = if radius <= half { (radius, &by_radius) } else { (half, &by_half) };
+    let (thin, by_thin) = if THIN * least > slot.round_mm {
+        (THIN * least, by_least * THIN)
+    } else {
+        (slot.round_mm, RowDVector::zeros(n))
+    };
     let (off, by_off) = (radius - thin, &by_radius - &by_thin);
     let upright = |ends, d_ends_dp| SkeletonCapsule {
         spread_mm: half - thin,

@@ -16,7 +16,8 @@ use crate::geometry::link::Role;
 use crate::ir::{Design, Section};
 use crate::optimize::Normal;
 use nalgebra::{DMatrix, DVector};
-use strip::{Strip, StripGradient, link_jacobian, link_strip, rod_jacobian, rod_strips, strips};
+use std::sync::OnceLock;
+use strip::{Strip, StripGradient, fineness, link_jacobian, link_strip, rod_jacobian, rod_strips, strips};
 
 /// 1 mm² in m².
 const SQUARE_METRE: f64 = 1e-6;
@@ -33,6 +34,9 @@ pub struct Collision {
     weight: f64,
     /// Per rod how many capsules side by side stand for it: ⌈b/a⌉ at the start, the same throughout a run.
     copies: Vec<usize>,
+    /// Copies and panels of the links at the first point seen: while their nets stay, so does how they are summed, or
+    /// the value would jump with their lengths.
+    fineness: OnceLock<Vec<(usize, usize)>>,
     /// Per rod its joint.
     joints: Vec<usize>,
 }
@@ -59,6 +63,7 @@ impl Collision {
             gap_mm,
             weight,
             copies: design.rods.iter().map(|r| copies(&r.section)).collect(),
+            fineness: OnceLock::new(),
             joints: design.rods.iter().map(|r| r.joint).collect(),
         }
     }
@@ -66,7 +71,16 @@ impl Collision {
     /// Calls `f` for every two strips nearer than the gap, with penalty (mm²) and its derivatives.
     fn for_each_pair(&self, view: &StateView, mut f: impl FnMut([Source; 2], f64, &[StripGradient; 2])) {
         let (model, poses) = (view.model, &view.equilibrium.state.poses);
-        let links: Vec<Strip> = view.capsules.iter().map(|c| link_strip(c, &poses[c.body])).collect();
+        let first = self.fineness.get_or_init(|| view.capsules.iter().map(fineness).collect());
+        let links: Vec<Strip> = view
+            .capsules
+            .iter()
+            .enumerate()
+            .map(|(i, c)| {
+                let same = first.get(i).filter(|_| first.len() == view.capsules.len());
+                link_strip(c, &poses[c.body], same.copied().unwrap_or_else(|| fineness(c)))
+            })
+            .collect();
         let rods: Vec<Vec<Strip>> = model
             .rods
             .iter()

@@ -8,10 +8,14 @@ use crate::math::{Pose, skew};
 use crate::rod::{RodState, SectionShape};
 use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
 
+/// Simpson's rule on −1..1, weights of sum 1.
+const SIMPSON: [(f64, f64); 3] = [(-1.0, 1.0 / 6.0), (0.0, 4.0 / 6.0), (1.0, 1.0 / 6.0)];
 /// What the outline of a link's fan may recede between its copies, mm …
 const DIP_MM: f64 = 0.06;
 /// … as long as that takes no more copies on either side of the middle.
 const MOST_PAIRS: f64 = 16.0;
+/// Most panels a link's length is summed in.
+const MOST_PANELS: f64 = 64.0;
 /// Numbers a strip is made of: two ends, fan direction, spread, radius.
 pub const NUMBERS: usize = 11;
 
@@ -24,6 +28,8 @@ pub struct Strip {
     pub radius: f64,
     /// How many capsules stand for the fan.
     pub copies: usize,
+    /// In how many panels its length is summed.
+    pub panels: usize,
     /// Whether it counts with its round ends: the pieces of a flexure do not, they go on.
     pub capped: bool,
 }
@@ -70,13 +76,12 @@ impl Strip {
         if self.copies < 2 { 0.0 } else { 2.0 * k as f64 / (self.copies - 1) as f64 - 1.0 }
     }
 
-    /// Places lengthwise, 0..1, with weights of sum one: panels no longer than the capsule is thick.
+    /// Places lengthwise, 0..1, with weights of sum one: of a link to the tips of its axis, of a flexure's edge
+    /// inside it.
     fn samples(&self) -> impl Iterator<Item = (f64, f64)> + use<> {
-        let length = (self.ends[1] - self.ends[0]).norm();
-        let panels =
-            if self.capped { ((length / (2.0 * self.radius)).ceil() as usize).clamp(1, 64) } else { 1 };
+        let (panels, rule) = (self.panels, if self.capped { SIMPSON } else { GAUSS_3 });
         (0..panels).flat_map(move |k| {
-            GAUSS_3.map(|(x, w)| ((k as f64 + 0.5 * (1.0 + x)) / panels as f64, w / panels as f64))
+            rule.map(|(x, w)| ((k as f64 + 0.5 * (1.0 + x)) / panels as f64, w / panels as f64))
         })
     }
 
@@ -173,6 +178,7 @@ pub fn rod_strips(state: &RodState, shape: SectionShape, half_widths: [f64; 2], 
                 spread: spread(shape, a, b),
                 radius: a,
                 copies,
+                panels: 1,
                 capped: false,
             }
         })
@@ -208,17 +214,25 @@ pub fn rod_jacobian(model: &Model, at: &Sensitivity, r: usize, j: usize) -> Opti
     Some(out)
 }
 
-/// A link's capsules at a pose.
-pub fn link_strip(capsule: &SkeletonCapsule, pose: &Pose) -> Strip {
+/// How finely a link's capsules are summed: copies and panels, these no longer than a capsule is thick.
+pub fn fineness(capsule: &SkeletonCapsule) -> (usize, usize) {
     // Half-way between two copies at a distance e the outline recedes by e²/8D, D at least two radii.
     let step = (16.0 * DIP_MM * capsule.radius_mm).sqrt();
     let pairs = (capsule.spread_mm / step).ceil().clamp(1.0, MOST_PAIRS) as usize;
+    let length = (capsule.ends[1] - capsule.ends[0]).norm();
+    let panels = (length / (2.0 * capsule.radius_mm)).ceil().clamp(1.0, MOST_PANELS) as usize;
+    (if capsule.spread_mm > 0.0 { 1 + 2 * pairs } else { 1 }, panels)
+}
+
+/// A link's capsules at a pose.
+pub fn link_strip(capsule: &SkeletonCapsule, pose: &Pose, (copies, panels): (usize, usize)) -> Strip {
     Strip {
         ends: capsule.ends.map(|p| pose.point(&p)),
         fan: pose.direction(&capsule.fan),
         spread: capsule.spread_mm,
         radius: capsule.radius_mm,
-        copies: if capsule.spread_mm > 0.0 { 1 + 2 * pairs } else { 1 },
+        copies,
+        panels,
         capped: true,
     }
 }
