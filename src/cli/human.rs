@@ -1,24 +1,15 @@
 //! What a build tells a person: short, aligned, the numbers that matter first.
 
 use super::style::Style;
+use flexura::ir::Assembly;
 use flexura::pipeline::{BuildOutcome, Measures, Origin};
 use std::fmt::Write;
 
 /// The report of a build; `written` are the files with their sizes in bytes.
 pub fn report(out: &BuildOutcome, written: &[(String, usize)], style: Style) -> String {
     let mut text = String::new();
-    if let Some(design) = &out.design {
-        let joints = design.joints.iter().filter(|j| j.is_compliant()).count();
-        let _ = writeln!(
-            text,
-            "{}  {}, {} flexible of {}, {}, {}",
-            style.bold(&design.name),
-            count(design.bodies.len(), "body", "bodies"),
-            joints,
-            count(design.joints.len(), "joint", "joints"),
-            count(design.rods.len(), "rod", "rods"),
-            count(design.free.len(), "free variable", "free variables"),
-        );
+    if let Some(assembly) = &out.assembly {
+        heading(&mut text, assembly, style);
     }
     if let Some(solution) = &out.solution {
         let how = match out.solved_from {
@@ -45,6 +36,32 @@ pub fn report(out: &BuildOutcome, written: &[(String, usize)], style: Style) -> 
     );
     let _ = writeln!(text, "\n{}", style.dim(&times));
     text
+}
+
+/// What is built: the mechanism, or every design with its instances.
+fn heading(text: &mut String, assembly: &Assembly, style: Style) {
+    let single = assembly.single().is_some();
+    if !single {
+        let (i, d) = (assembly.instances.len(), assembly.designs.len());
+        let solved = count(d, "design", "designs");
+        let _ = writeln!(text, "{}  {} of {solved}", style.bold(&assembly.name), count(i, "instance", "instances"));
+    }
+    for (k, design) in assembly.designs.iter().enumerate() {
+        let joints = design.joints.iter().filter(|j| j.is_compliant()).count();
+        let _ = write!(
+            text,
+            "{}  {}, {} flexible of {}, {}, {}",
+            if single { style.bold(&design.name) } else { format!("  {}", design.name) },
+            count(design.bodies.len(), "body", "bodies"),
+            joints,
+            count(design.joints.len(), "joint", "joints"),
+            count(design.rods.len(), "rod", "rods"),
+            count(design.free.len(), "free variable", "free variables"),
+        );
+        let of: Vec<&str> =
+            assembly.instances.iter().filter(|i| i.design == k).map(|i| i.name.as_str()).collect();
+        let _ = if single { writeln!(text) } else { writeln!(text, ": {}", of.join(", ")) };
+    }
 }
 
 fn measures(text: &mut String, before: Option<&Measures>, after: Option<&Measures>, style: Style) {

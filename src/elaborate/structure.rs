@@ -318,7 +318,7 @@ impl<'a> Evaluator<'a> {
         self.direction(scope, e)
     }
 
-    fn direction(&mut self, scope: usize, e: &'a Expr) -> Outcome<[f64; 3]> {
+    pub(super) fn direction(&mut self, scope: usize, e: &'a Expr) -> Outcome<[f64; 3]> {
         if let Some(axis) = named_axis(e) {
             return Ok(axis);
         }
@@ -364,7 +364,7 @@ impl<'a> Evaluator<'a> {
                     .help("leave out `pin`, or `as …`"),
             );
         }
-        let d = self.eval_fixed(scope, e, Dimension::LENGTH, "the pin's diameter")?;
+        let d = self.unscaled(|s| s.eval_fixed(scope, e, Dimension::LENGTH, "the pin's diameter"))?;
         if d <= 0.0 {
             return self.fail(Diagnostic::error(codes::SIZE, "the pin's diameter must be positive", e.at));
         }

@@ -9,12 +9,14 @@
 //! | `tidy` | removal of tiny edges before rounding to `f32` |
 //! | `union` | the boolean kernel's only client |
 //! | `mesh`, `check`, `ray` | triangle meshes, their facts, measurements on them |
+//! | `joined` | parts of several instances |
 //! | `distance`, `gap`, `cycle` | least distances, overlaps in the rest pose, gaps over a cycle |
 
 pub mod check;
 pub mod cycle;
 pub mod distance;
 pub mod gap;
+pub mod joined;
 pub mod link;
 pub mod mesh;
 pub mod parts;

@@ -1,11 +1,13 @@
 //! The narrow waist: a [`Design`] is all that elaboration hands to the numerical stages, and a
 //! [`Solution`] all that they hand back. Plain data; units are mm, N, MPa, rad, s throughout.
 
+pub mod assembly;
 mod drive;
 pub mod expr;
 mod solution;
 
 pub use crate::diagnostic::Origin;
+pub use assembly::{Assembly, Instance, Placement};
 pub use drive::{Drive, DriveUnit, Profile};
 use expr::{ExprGraph, ExprId};
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,7 @@
 //! The real stages: the only place where the pipeline touches elaboration, kinematics, equilibrium,
 //! optimisation and geometry.
 
+use super::joined::{self, Solid};
 use super::progress::Iteration;
 use super::report::Artefact;
 use super::solids;
@@ -10,7 +11,7 @@ use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
 use crate::emit::stl::stl_bytes;
 use crate::equilibrium::{Cycle, Layout, Model, ModelError, SweepError, sweep};
-use crate::ir::{Design, ObjectiveKind, Solution};
+use crate::ir::{Assembly, Design, ObjectiveKind, Solution};
 use crate::kinematics::{Constraint, Motion, solve_motion};
 use crate::math::{Pose, log_so3};
 use crate::optimize::{self, Ending, Method, Problem};
@@ -49,7 +50,7 @@ impl Stages for Compiler {
     ) -> Checked {
         let options = Options { set: overrides.to_vec(), steps };
         let out = elaborate(source, files, &options);
-        Checked { sources: out.sources, design: out.design, diagnostics: out.diagnostics }
+        Checked { sources: out.sources, assembly: out.assembly, diagnostics: out.diagnostics }
     }
 
     fn rigid(&self, design: &Design) -> Result<Simulation, Failed> {
@@ -152,17 +153,30 @@ impl Stages for Compiler {
         })
     }
 
-    fn mesh(&self, design: &Design, values: &[f64]) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
-        solids::available(design)?;
-        let (layout, motion) = layout(design, values)?;
-        let model = Model::new(design, &layout, values, MESH_EDGES, false).map_err(|e| no_rod(design, &e))?;
-        let (parts, found) = solids::build(design, &layout, &motion, &model)?;
+    fn parts(
+        &self,
+        assembly: &Assembly,
+        values: &[Vec<f64>],
+    ) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
+        let mut found = Vec::new();
+        let mut built = Vec::new();
+        for (design, values) in assembly.designs.iter().zip(values) {
+            solids::available(design)?;
+            let (layout, motion) = layout(design, values)?;
+            let model =
+                Model::new(design, &layout, values, MESH_EDGES, false).map_err(|e| no_rod(design, &e))?;
+            let (parts, findings) = solids::build(design, &layout, &motion, &model)?;
+            found.extend(findings);
+            built.push(Solid { input: solids::parts_input(design, &layout, &motion, &model), parts });
+        }
+        let (parts, findings) = joined::parts(assembly, &built)?;
+        found.extend(findings);
         let mut artefacts = Vec::new();
-        for part in &parts.parts {
-            let bytes = stl_bytes(&part.mesh).map_err(|e| {
-                vec![Diagnostic::error("E0631", format!("no STL can be written: {e}"), design.origin)]
+        for (name, mesh) in &parts {
+            let bytes = stl_bytes(mesh).map_err(|e| {
+                vec![Diagnostic::error("E0631", format!("no STL can be written: {e}"), assembly.origin)]
             })?;
-            artefacts.push(Artefact { name: format!("{}_{}.stl", design.name, part.name), bytes });
+            artefacts.push(Artefact { name: format!("{name}.stl"), bytes });
         }
         Ok((artefacts, found))
     }

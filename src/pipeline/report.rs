@@ -1,7 +1,7 @@
 //! What a build tells: the numbers before and after, what was required, what was made, how long it took.
 
 use crate::diagnostic::{Diagnostic, SourceMap};
-use crate::ir::{Design, Solution};
+use crate::ir::{Assembly, Design, Solution};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -129,7 +129,9 @@ pub struct BuildOutcome {
     pub sources: SourceMap,
     /// Findings of all stages, in their order.
     pub diagnostics: Vec<Diagnostic>,
-    /// The elaborated design.
+    /// What is built.
+    pub assembly: Option<Assembly>,
+    /// Its design, if it is one mechanism that places no others.
     pub design: Option<Design>,
     /// The solved values.
     pub solution: Option<Solution>,

@@ -77,7 +77,7 @@ pub fn available(design: &Design) -> Result<(), Failed> {
     }
 }
 
-fn parts_input(design: &Design, layout: &Layout, motion: &Motion, model: &Model) -> PartsInput {
+pub(super) fn parts_input(design: &Design, layout: &Layout, motion: &Motion, model: &Model) -> PartsInput {
     let values = design.exprs.values(&design.free.iter().map(|f| f.start).collect::<Vec<_>>());
     let drawn = |p: [crate::ir::expr::ExprId; 3]| Vector3::from(p.map(|id| values[id.0 as usize]));
     let pitch = design.layers.pitch_mm;

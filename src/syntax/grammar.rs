@@ -132,6 +132,10 @@ fn words(rule: Rule) -> String {
         Rule::rod_from => "`from`",
         Rule::rod_to => "`to`",
         Rule::rod_section => "`section`",
+        Rule::turned => "`turned`",
+        Rule::scaled => "`scale`",
+        Rule::merging => "`merging`",
+        Rule::sharing => "`sharing`",
         other => {
             // Keyword rules are called after their keyword.
             let name = format!("{other:?}");
@@ -244,6 +248,12 @@ fn kind(rule: Rule) -> Kind {
         Rule::rod_from => Kind::RodFrom,
         Rule::rod_to => Kind::RodTo,
         Rule::rod_section => Kind::RodSection,
+        Rule::st_place => Kind::Place,
+        Rule::turned => Kind::Turned,
+        Rule::scaled => Kind::Scaled,
+        Rule::merging => Kind::Merging,
+        Rule::st_mirror => Kind::Mirror,
+        Rule::sharing => Kind::Sharing,
         Rule::st_later => Kind::Later,
         Rule::value => Kind::Value,
         Rule::free => Kind::Free,

@@ -69,12 +69,14 @@ impl Lower<'_> {
                 node.all(Kind::Artefact).filter_map(|n| n.parts().next()).map(|n| self.expr(n)).collect(),
             ),
             Kind::Rod => StatementKind::Rod(Box::new(self.rod(node)?)),
+            Kind::Place => StatementKind::Place(Box::new(self.place(node)?)),
+            Kind::Mirror => StatementKind::Mirror(Box::new(self.mirror(node)?)),
             Kind::Later => StatementKind::Later { keyword: self.named(node.first(Kind::Keyword)?) },
             _ => return None,
         })
     }
 
-    fn values(&mut self, node: &Node) -> Vec<Expr> {
+    pub(super) fn values(&mut self, node: &Node) -> Vec<Expr> {
         node.all(Kind::Value).map(|n| self.expr(n)).collect()
     }
 
@@ -119,7 +121,7 @@ impl Lower<'_> {
         Some(joint)
     }
 
-    fn twice(&mut self, clause: &Node, first: Origin) {
+    pub(super) fn twice(&mut self, clause: &Node, first: Origin) {
         let word = clause.first(Kind::Keyword).map_or("", |n| self.text(n));
         let at = self.origin(clause);
         self.report(

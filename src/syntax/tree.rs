@@ -79,6 +79,12 @@ pub enum Kind {
     RodFrom,
     RodTo,
     RodSection,
+    Place,
+    Turned,
+    Scaled,
+    Merging,
+    Mirror,
+    Sharing,
     Later,
     // items
     File,

@@ -98,6 +98,8 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "field" => "NAME = VALUE",
         "require" => "require VALUE <= VALUE",
         "export" => "export NAME, …",
+        "place" => "place NAME = MECHANISM at POINT",
+        "mirror" => "mirror NAME = INSTANCE across yz",
         "rod" => "rod NAME { from a at … along … to b at … along … section … }",
         _ => return None,
     })
