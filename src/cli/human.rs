@@ -44,7 +44,12 @@ fn heading(text: &mut String, assembly: &Assembly, style: Style) {
     if !single {
         let (i, d) = (assembly.instances.len(), assembly.designs.len());
         let solved = count(d, "design", "designs");
-        let _ = writeln!(text, "{}  {} of {solved}", style.bold(&assembly.name), count(i, "instance", "instances"));
+        let _ = writeln!(
+            text,
+            "{}  {} of {solved}",
+            style.bold(&assembly.name),
+            count(i, "instance", "instances")
+        );
     }
     for (k, design) in assembly.designs.iter().enumerate() {
         let joints = design.joints.iter().filter(|j| j.is_compliant()).count();

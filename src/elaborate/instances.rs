@@ -125,16 +125,7 @@ impl<'a> Evaluator<'a> {
             queries.exports.iter().filter_map(|q| self.instance_export(scope, q, &parts).ok()).collect();
         let Parts { designs, instances, joined, motors, .. } = parts;
         let name = m.name.node.clone();
-        Some(Assembly {
-            name,
-            designs,
-            instances,
-            joined,
-            motors,
-            requirements,
-            exports,
-            origin: m.name.at,
-        })
+        Some(Assembly { name, designs, instances, joined, motors, requirements, exports, origin: m.name.at })
     }
 
     /// Only instances and what concerns the whole may stand beside instances.
@@ -387,10 +378,7 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Tells the evaluator about the instance's design: names of its traces and drives.
-    fn inside(
-        &mut self,
-        design: Option<&Design>,
-    ) -> (BTreeMap<String, usize>, BTreeMap<String, usize>) {
+    fn inside(&mut self, design: Option<&Design>) -> (BTreeMap<String, usize>, BTreeMap<String, usize>) {
         let none = (BTreeMap::new(), BTreeMap::new());
         self.sliders.clear();
         let Some(d) = design else { return none };

@@ -59,7 +59,9 @@ impl<'a> Evaluator<'a> {
     /// Reports images of each other, at the first of them.
     fn mirror_circle(&mut self, mirror: &ast::Mirror, left: &[&(&'a ast::Mirror, Origin)]) {
         let mut chain = vec![mirror];
-        while let Some((next, _)) = left.iter().find(|(m, _)| chain.last().is_some_and(|c| c.of.node == m.name.node)) {
+        while let Some((next, _)) =
+            left.iter().find(|(m, _)| chain.last().is_some_and(|c| c.of.node == m.name.node))
+        {
             if next.name.node == mirror.name.node {
                 let first = chain.iter().map(|m| m.name.at.start).min();
                 if first != Some(mirror.name.at.start) {
@@ -113,7 +115,11 @@ impl<'a> Evaluator<'a> {
         }
         // What the original is merged with, the image is merged with.
         let merged = |b: &usize| parts.joined.iter().any(|j| j.members.contains(&(original, *b)));
-        shared.extend((0..design.bodies.len()).filter(|b| design.bodies.get(*b).is_some_and(|d| d.ground)).filter(merged));
+        shared.extend(
+            (0..design.bodies.len())
+                .filter(|b| design.bodies.get(*b).is_some_and(|d| d.ground))
+                .filter(merged),
+        );
         for name in &text.sharing {
             let body = self.body_of(Some(&design), name)?;
             self.sharable(&design, body, &shared, name)?;
@@ -244,12 +250,7 @@ impl<'a> Evaluator<'a> {
 
 /// 1 if the image of a joint's axis is the axis, −1 if it is the axis reversed; none if it is another line. A slider
 /// has a direction only.
-fn along_plane(
-    design: &Design,
-    joint: &Joint,
-    from: &Placement,
-    to: &Placement,
-) -> Option<f64> {
+fn along_plane(design: &Design, joint: &Joint, from: &Placement, to: &Placement) -> Option<f64> {
     let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
     let values = design.exprs.values(&start);
     let point = joint.point.map(|id| values.get(id.0 as usize).copied().unwrap_or(f64::NAN));

@@ -188,7 +188,9 @@ fn roles(program: &load::Program, module: usize) -> (Option<&Mechanism>, Vec<&Me
     let free = mechanisms.iter().rev().find(|(i, _)| !in_use.contains(&(module, *i)));
     let Some((built, m)) = free.or(mechanisms.last()) else { return (None, Vec::new()) };
     let own: std::collections::BTreeSet<(usize, usize)> = placed(*built).collect();
-    let others = mechanisms.iter().filter(|(i, _)| i != built && !own.contains(&(module, *i)));
+    // One that is made of others cannot be placed yet: nobody has looked at it.
+    let seen = |i: usize, m: &Mechanism| own.contains(&(module, i)) && !instances::is_assembly(m);
+    let others = mechanisms.iter().filter(|(i, m)| i != built && !seen(*i, m));
     (Some(m), others.map(|(_, m)| *m).collect())
 }
 

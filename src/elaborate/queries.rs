@@ -62,13 +62,9 @@ pub fn drive_texts(m: &Mechanism) -> Vec<DriveText<'_>> {
     m.statements
         .iter()
         .filter_map(|s| match &s.kind {
-            StatementKind::Drive { joint, profile, motor, continuous } => Some(DriveText {
-                joint,
-                profile,
-                motor: motor.as_ref(),
-                continuous: *continuous,
-                at: s.at,
-            }),
+            StatementKind::Drive { joint, profile, motor, continuous } => {
+                Some(DriveText { joint, profile, motor: motor.as_ref(), continuous: *continuous, at: s.at })
+            }
             _ => None,
         })
         .collect()
@@ -95,10 +91,9 @@ fn stripped(e: &Expr, names: &BTreeSet<&str>, found: &mut Vec<Ident>) -> Expr {
                     {
                         path.iter().for_each(|p| meet(found, p));
                     }
-                    _ => kept.push(Argument {
-                        name: a.name.clone(),
-                        value: stripped(&a.value, names, found),
-                    }),
+                    _ => {
+                        kept.push(Argument { name: a.name.clone(), value: stripped(&a.value, names, found) })
+                    }
                 }
             }
             ExprKind::Call { function: function.clone(), arguments: kept }
@@ -107,9 +102,7 @@ fn stripped(e: &Expr, names: &BTreeSet<&str>, found: &mut Vec<Ident>) -> Expr {
         ExprKind::Binary(op, a, b) => {
             ExprKind::Binary(*op, Box::new(stripped(a, names, found)), Box::new(stripped(b, names, found)))
         }
-        ExprKind::Tuple(items) => {
-            ExprKind::Tuple(items.iter().map(|i| stripped(i, names, found)).collect())
-        }
+        ExprKind::Tuple(items) => ExprKind::Tuple(items.iter().map(|i| stripped(i, names, found)).collect()),
         ExprKind::Number { .. } | ExprKind::Text(_) | ExprKind::Free { .. } | ExprKind::Broken => {
             e.kind.clone()
         }

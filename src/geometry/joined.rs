@@ -22,7 +22,8 @@ impl Mesh {
     pub fn placed(&self, placement: &Placement) -> Mesh {
         let vertices = self.vertices.iter().map(|p| placement.point(p)).collect();
         let turned = placement.is_mirrored();
-        let triangles = self.triangles.iter().map(|[a, b, c]| if turned { [*a, *c, *b] } else { [*a, *b, *c] });
+        let triangles =
+            self.triangles.iter().map(|[a, b, c]| if turned { [*a, *c, *b] } else { [*a, *b, *c] });
         Mesh { vertices, triangles: triangles.collect() }
     }
 }
@@ -104,7 +105,10 @@ fn overgrown(shares: &[Share<'_>], facets: &Facets) -> Vec<Mesh> {
                     let mut own = plan.bores.iter().map(|b| b.placed(&other.placement));
                     let hole = bore.slot(0.0);
                     !own.any(|b| b.is(&bore))
-                        && plan.slots.iter().any(|(_, s)| separation(&s.placed(&other.placement), &hole).gap_mm < 0.0)
+                        && plan
+                            .slots
+                            .iter()
+                            .any(|(_, s)| separation(&s.placed(&other.placement), &hole).gap_mm < 0.0)
                 })
             });
             if filled {
@@ -143,7 +147,9 @@ fn pieces(mesh: &Mesh) -> Vec<Mesh> {
             let [outer, inner] = [used_box(solid), used_box(&cavity)];
             (0..3).all(|k| outer.0[k] <= inner.0[k] && inner.1[k] <= outer.1[k])
         };
-        if let Some(solid) = solids.iter_mut().filter(|s| inside(s)).min_by(|a, b| a.volume_mm3().total_cmp(&b.volume_mm3())) {
+        if let Some(solid) =
+            solids.iter_mut().filter(|s| inside(s)).min_by(|a, b| a.volume_mm3().total_cmp(&b.volume_mm3()))
+        {
             solid.triangles.extend(cavity.triangles);
         }
     }

@@ -30,7 +30,8 @@ pub fn place(assembly: &Assembly, designs: &[Simulation]) -> Vec<Simulation> {
             };
             let sum: Option<f64> = members.iter().map(|(i, k, _)| load(*i, *k)).sum();
             for (i, k, _) in &members {
-                let slot = placed.get_mut(*i).and_then(|p| p.motion.states.get_mut(s)?.drive_loads.get_mut(*k));
+                let slot =
+                    placed.get_mut(*i).and_then(|p| p.motion.states.get_mut(s)?.drive_loads.get_mut(*k));
                 if let (Some(slot), Some(sum)) = (slot, sum) {
                     *slot = sum;
                 }
@@ -98,8 +99,13 @@ pub fn combine(assembly: &Assembly, placed: Vec<Simulation>) -> Simulation {
     };
     let once = |i: usize, body: &String| {
         let index = |b: &crate::ir::Body, n: &Instance| n.of(&b.name) == *body;
-        let (n, d) = (assembly.instances.get(i), assembly.instances.get(i).and_then(|n| assembly.designs.get(n.design)));
-        let Some(b) = n.zip(d).and_then(|(n, d)| d.bodies.iter().position(|b| index(b, n))) else { return true };
+        let (n, d) = (
+            assembly.instances.get(i),
+            assembly.instances.get(i).and_then(|n| assembly.designs.get(n.design)),
+        );
+        let Some(b) = n.zip(d).and_then(|(n, d)| d.bodies.iter().position(|b| index(b, n))) else {
+            return true;
+        };
         let group = assembly.joined.iter().find(|j| j.members.contains(&(i, b)));
         group.is_none_or(|j| j.members.first() == Some(&(i, b)))
     };
@@ -143,7 +149,10 @@ pub fn measure_all(assembly: &Assembly, placed: &[Simulation]) -> Measures {
         all.traces.extend(own.traces.into_iter().map(|(n, t)| (instance.of(&n), t)));
         for (k, drive) in design.drives.iter().enumerate() {
             let motor = instance.drives.get(k).and_then(|d| assembly.motors.get(d.motor));
-            let loads = own.drives.get(&drive.name).filter(|_| motor.is_some_and(|m| (m.instance, m.drive) == (i, k)));
+            let loads = own
+                .drives
+                .get(&drive.name)
+                .filter(|_| motor.is_some_and(|m| (m.instance, m.drive) == (i, k)));
             all.drives.extend(loads.map(|l| (instance.of(&drive.name), *l)));
         }
         all.stress.max_mpa = more(all.stress.max_mpa, own.stress.max_mpa, f64::max);

@@ -38,10 +38,17 @@ pub fn parts(
         let shares: Vec<Share<'_>> = group.iter().filter_map(share).collect();
         let (name, at) = name(assembly, solids, &group);
         let pieces = unite(&shares, &Facets::default()).map_err(|e| {
-            vec![Diagnostic::error("E0630", format!("no solid comes out: `{name}` cannot be united: {e}"), at)]
+            vec![Diagnostic::error(
+                "E0630",
+                format!("no solid comes out: `{name}` cannot be united: {e}"),
+                at,
+            )]
         })?;
         if pieces.len() > 1 {
-            let message = format!("`{name}` is printed in {} pieces: what is to be one body does not touch", pieces.len());
+            let message = format!(
+                "`{name}` is printed in {} pieces: what is to be one body does not touch",
+                pieces.len()
+            );
             found.push(
                 Diagnostic::warning("W0640", message, at)
                     .help("move the instances until the common bodies meet, or join the pieces otherwise"),
@@ -94,7 +101,9 @@ fn name(assembly: &Assembly, solids: &[Solid], group: &[(usize, usize)]) -> (Str
         solids.get(design)?.parts.parts.get(p)
     };
     let common = group.iter().filter_map(|(i, p)| Some((*i, part_of(*i, *p)?)));
-    let first = common.flat_map(|(i, part)| part.bodies.iter().filter_map(move |b| joint_body(assembly, i, *b))).min();
+    let first = common
+        .flat_map(|(i, part)| part.bodies.iter().filter_map(move |b| joint_body(assembly, i, *b)))
+        .min();
     if let Some(joined) = first.and_then(|j| assembly.joined.get(j)) {
         return (format!("{}_{}", assembly.name, joined.name), joined.origin);
     }
@@ -117,7 +126,9 @@ fn in_the_way(assembly: &Assembly, solids: &[Solid]) -> Vec<Diagnostic> {
     let mut found = Vec::new();
     for (i, first) in standing.iter().enumerate() {
         for (j, second) in standing.iter().enumerate().skip(i + 1) {
-            let (Some(one), Some(other)) = (assembly.instances.get(i), assembly.instances.get(j)) else { continue };
+            let (Some(one), Some(other)) = (assembly.instances.get(i), assembly.instances.get(j)) else {
+                continue;
+            };
             let bound = assembly.designs.get(one.design).map_or(0.0, |d| d.process.clearance_mm);
             let mut worst: Option<(f64, nalgebra::Vector3<f64>, &str, &str)> = None;
             for (name, joined, a) in first {
@@ -149,10 +160,10 @@ fn members(
 ) -> Vec<(String, Option<usize>, Standing)> {
     let p = &instance.placement;
     let bodies = solid.input.bodies.iter().zip(&solid.parts.plans).enumerate();
-    let bodies = bodies
-        .map(|(b, (body, plan))| (instance.of(&body.name), joint_body(assembly, index, b), Standing::body(plan, p)));
-    let flexures =
-        solid.input.flexures.iter().map(|f| (instance.of(&f.path), None, Standing::flexure(f, p)));
+    let bodies = bodies.map(|(b, (body, plan))| {
+        (instance.of(&body.name), joint_body(assembly, index, b), Standing::body(plan, p))
+    });
+    let flexures = solid.input.flexures.iter().map(|f| (instance.of(&f.path), None, Standing::flexure(f, p)));
     bodies.chain(flexures).collect()
 }
 
@@ -165,8 +176,12 @@ fn told(
 ) -> Diagnostic {
     let place = format!("near ({:.1}, {:.1}, {:.1}) mm", at.x, at.y, at.z);
     let d = if gap < 0.0 {
-        Diagnostic::error("E0641", format!("`{a}` and `{b}` stand in each other's way in the rest pose"), other.origin)
-            .label(format!("they overlap by {:.2} mm {place}", -gap))
+        Diagnostic::error(
+            "E0641",
+            format!("`{a}` and `{b}` stand in each other's way in the rest pose"),
+            other.origin,
+        )
+        .label(format!("they overlap by {:.2} mm {place}", -gap))
     } else {
         Diagnostic::warning("W0642", format!("`{a}` and `{b}` are printed {gap:.2} mm apart"), other.origin)
             .label(format!("{place}; the process needs {clearance:.2} mm"))

@@ -141,7 +141,8 @@ pub fn simulate(
             keep(rigid, &mut out.diagnostics)?
         } else {
             let mut found = Vec::new();
-            for (design, lock) in assembly.designs.iter().zip(read_locks(request, &assembly, &mut out).ok()?) {
+            for (design, lock) in assembly.designs.iter().zip(read_locks(request, &assembly, &mut out).ok()?)
+            {
                 let solution = match lock {
                     Some((lock, LockState::Current)) => lock.solution,
                     _ if request.frozen => {
@@ -150,7 +151,10 @@ pub fn simulate(
                     }
                     _ => Solution { values: start_of(design), ..Solution::default() },
                 };
-                found.push(keep(stages.simulate(design, &values_of(design, &solution)), &mut out.diagnostics)?);
+                found.push(keep(
+                    stages.simulate(design, &values_of(design, &solution)),
+                    &mut out.diagnostics,
+                )?);
             }
             // The conventional motion's findings have been told by the check.
             tell_once(found.iter().flat_map(|s| s.diagnostics.iter().cloned()), &mut out);

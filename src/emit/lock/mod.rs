@@ -92,8 +92,10 @@ impl Lock {
     /// The file's text.
     pub fn write(&self) -> String {
         let entries = self.entries();
-        let line = |key: &str, alone: &str, of: fn(&Head) -> String| several::lines(&self.named, key, alone, of);
-        let (iterations, converged) = (self.solution.iterations.to_string(), self.solution.converged.to_string());
+        let line =
+            |key: &str, alone: &str, of: fn(&Head) -> String| several::lines(&self.named, key, alone, of);
+        let (iterations, converged) =
+            (self.solution.iterations.to_string(), self.solution.converged.to_string());
         format!(
             "{TITLE}\n# The solved design. Keep it beside its source; `flexura build` reads and writes it.\n\
              {}solver {}\nvalues {}\n{}{}\n{entries}",
@@ -306,7 +308,8 @@ impl Parser<'_> {
         for key in ["design", "solver", "values", "iterations", "converged"] {
             let of_designs = |name: &String| self.seen.contains_key(&format!("{key} {name}"));
             let named = matches!(key, "design" | "iterations" | "converged") && !self.lock.named.is_empty();
-            let stated = if named { self.lock.named.keys().all(of_designs) } else { self.seen.contains_key(key) };
+            let stated =
+                if named { self.lock.named.keys().all(of_designs) } else { self.seen.contains_key(key) };
             if !stated {
                 self.fail("E0705", format!("the lock has no `{key}` line: it is incomplete"), end);
             }

@@ -43,7 +43,8 @@ impl Lock {
             intact: self.intact,
             ..Self::default()
         };
-        out.solution.values = self.solution.values.iter().filter_map(|(p, v)| Some((inside(p)?, *v))).collect();
+        out.solution.values =
+            self.solution.values.iter().filter_map(|(p, v)| Some((inside(p)?, *v))).collect();
         out.solution.iterations = head.iterations;
         out.solution.converged = head.converged;
         out
@@ -51,7 +52,12 @@ impl Lock {
 }
 
 /// Lines of a heading: one, or one a design.
-pub(super) fn lines(named: &BTreeMap<String, Head>, key: &str, alone: &str, of: impl Fn(&Head) -> String) -> String {
+pub(super) fn lines(
+    named: &BTreeMap<String, Head>,
+    key: &str,
+    alone: &str,
+    of: impl Fn(&Head) -> String,
+) -> String {
     if named.is_empty() {
         return format!("{key} {alone}\n");
     }

@@ -119,6 +119,7 @@ fn several_designs_have_a_part_each() {
     assert_eq!(read.part("palm").solution.values, BTreeMap::new(), "nothing is known of it");
     assert_eq!(codes(&text.replace("converged thumb false\n", "")), ["E0705"]);
     assert_eq!(codes(&text.replace("iterations finger 23", "iterations finger many")), ["E0703"]);
-    let edited = Lock::parse(&text.replace("thumb.knee.thickness = 0.9", "thumb.knee.thickness = 0.7"), 0).unwrap();
+    let edited =
+        Lock::parse(&text.replace("thumb.knee.thickness = 0.9", "thumb.knee.thickness = 0.7"), 0).unwrap();
     assert!(!edited.part("thumb").intact);
 }
