@@ -4,8 +4,9 @@
 mod common;
 
 use flexura::elaborate::{Elaborated, Options, elaborate};
-use flexura::geometry::{Mesh, check_mesh};
-use flexura::ir::{Assembly, Design, Realization};
+use flexura::geometry::joined::{Share, unite};
+use flexura::geometry::{BodySolid, Bore, Eye, Facets, Mesh, PartsInput, Probe, build_parts, check_mesh};
+use flexura::ir::{Assembly, Design, Placement, Quantity, Realization};
 use flexura::pipeline::{
     self, Artefact, BuildOutcome, Checked, Compiler, Failed, Files, Iteration, Progress,
 };
@@ -393,4 +394,91 @@ fn merged_grounds_are_one_part() {
     let parts = meshes(&artefacts);
     assert_eq!(parts.iter().map(|p| p.0.as_str()).collect::<Vec<_>>(), ["twins_board.stl"]);
     assert!(check_mesh(&parts[0].1).is_printable());
+}
+
+/// Where a merged ground of another instance runs through a bore, the bore is cut again.
+#[test]
+fn a_bore_stays_open_in_a_merged_body() {
+    let v = Vector3::new;
+    let bar = |points: [Vector3<f64>; 2], bored: bool| {
+        let at =
+            Eye { joint: 0, point: v(0.0, 0.0, 0.0), bore: Bore::Through { diameter_mm: 5.0 }, slot: (0, 1) };
+        let body = BodySolid {
+            name: "base".into(),
+            level_mm: 0.0,
+            skeleton: points.to_vec(),
+            eyes: if bored { vec![at] } else { Vec::new() },
+        };
+        build_parts(&PartsInput {
+            axis: v(0.0, 0.0, 1.0),
+            height_mm: 8.0,
+            clearance_mm: 0.3,
+            least_wall_mm: 0.6,
+            bodies: vec![body],
+            flexures: Vec::new(),
+            facets: Facets::default(),
+        })
+        .unwrap()
+    };
+    let bored = bar([v(0.0, 0.0, 0.0), v(30.0, 0.0, 0.0)], true);
+    let plain = bar([v(0.0, -20.0, 0.0), v(0.0, 20.0, 0.0)], false);
+    let place = |x: f64| Placement::new(&nalgebra::Matrix3::identity(), &v(x, 0.0, 0.0));
+    let united = |x: f64| {
+        let shares = [(&bored, 0.0), (&plain, x)].map(|(p, x)| Share {
+            mesh: &p.parts[0].mesh,
+            placement: place(x),
+            common: p.plans.iter().collect(),
+        });
+        unite(&shares, &Facets::default()).unwrap()
+    };
+    for x in [0.5, 12.0] {
+        let solids = united(x);
+        assert_eq!(solids.len(), 1);
+        let facts = check_mesh(&solids[0]);
+        assert!(facts.is_printable(), "{facts:?}");
+        for direction in [v(1.0, 0.0, 0.0), v(0.3, 1.0, 0.0)] {
+            let width = Probe::new(&solids[0]).hollow_mm(&v(0.0, 0.0, 0.1), &direction).unwrap();
+            assert!((5.0..5.1).contains(&width), "{x}: {width}");
+        }
+    }
+}
+
+#[test]
+fn a_query_can_be_put_to_one_instance() {
+    let text = CAR.replace(
+        "export stl",
+        "require min(gap(left)) >= -5 mm\n    require max(stress(left)) <= 1 GPa\n    export stl",
+    );
+    let a = assembly(&text);
+    let found: Vec<_> = a.requirements.iter().map(|r| (r.instance, r.requirement.quantity.clone())).collect();
+    assert_eq!(found[3], (Some(1), Quantity::Gap));
+    assert_eq!(found[4], (Some(1), Quantity::Stress));
+    assert_eq!(found[1], (None, Quantity::Stress));
+}
+
+/// An image's own motor turns the other way; a motor in common has one sketch, whoever asks for it.
+#[test]
+fn sketches_are_those_of_the_motors() {
+    let stages =
+        Counted { compiler: Compiler { iterations: 0, ..Compiler::default() }, ..Counted::default() };
+    let sketch = |text: &str| -> Vec<(String, Vec<i64>)> {
+        let out = build(text, &stages, None);
+        let positions = |a: &Artefact| {
+            let text = String::from_utf8(a.bytes.clone()).unwrap();
+            let table = text.split_once("] PROGMEM = {").or(text.split_once("] = {")).expect("a table").1;
+            let table = table.split_once('}').unwrap().0;
+            table.split(',').filter_map(|n| n.trim().parse().ok()).collect()
+        };
+        out.artefacts.iter().map(|a| (a.name.clone(), positions(a))).collect()
+    };
+    let shared = sketch(&CAR.replace("export stl, arduino(right.servo)", "export arduino(left.servo)"));
+    assert_eq!(shared[0].0, "car_right_servo/car_right_servo.ino");
+    let own = CAR.replace("sharing chassis, arm", "sharing chassis");
+    let own = sketch(
+        &own.replace("export stl, arduino(right.servo)", "export arduino(right.servo), arduino(left.servo)"),
+    );
+    assert_eq!(own[1].0, "car_left_servo/car_left_servo.ino");
+    assert_eq!(own[0].1, shared[0].1);
+    assert!(own[0].1.len() > 8 && own[0].1.iter().any(|n| *n != 0), "{own:?}");
+    assert_eq!(own[1].1, own[0].1.iter().map(|n| -n).collect::<Vec<_>>());
 }

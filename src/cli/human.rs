@@ -26,7 +26,7 @@ pub fn report(out: &BuildOutcome, written: &[(String, usize)], style: Style) -> 
         let end = if solution.converged { "converged" } else { "not converged" };
         let _ = writeln!(text, "solved  {how}, {end}");
     }
-    measures(&mut text, out.before.as_ref(), out.after.as_ref(), style);
+    measures(&mut text, out, style);
     requirements(&mut text, out, style);
     artefacts(&mut text, written, style);
     let s = &out.seconds;
@@ -69,10 +69,20 @@ fn heading(text: &mut String, assembly: &Assembly, style: Style) {
     }
 }
 
-fn measures(text: &mut String, before: Option<&Measures>, after: Option<&Measures>, style: Style) {
+/// Whether an instance does what an earlier one of the same design does: its numbers are the same.
+fn repeated(out: &BuildOutcome, name: &str) -> bool {
+    let Some(assembly) = out.assembly.as_ref().filter(|a| a.single().is_none()) else { return false };
+    let instance = name.split_once('.').map_or("", |n| n.0);
+    let at = assembly.instances.iter().position(|i| i.name == instance);
+    let Some((at, own)) = at.and_then(|k| Some((k, assembly.instances.get(k)?))) else { return false };
+    assembly.instances.iter().take(at).any(|i| i.design == own.design)
+}
+
+fn measures(text: &mut String, out: &BuildOutcome, style: Style) {
+    let (before, after) = (out.before.as_ref(), out.after.as_ref());
     let Some(result) = after.or(before) else { return };
     let mut rows: Vec<(String, Option<f64>, Option<f64>, &str)> = Vec::new();
-    for name in result.traces.keys() {
+    for name in result.traces.keys().filter(|n| !repeated(out, n)) {
         let of = |m: Option<&Measures>| m.and_then(|m| m.traces.get(name)).cloned();
         let (b, a) = (of(before), of(after));
         let mean = |t: &Option<flexura::pipeline::TraceMeasures>| t.as_ref().map(|t| t.mean_error_mm);
@@ -80,7 +90,7 @@ fn measures(text: &mut String, before: Option<&Measures>, after: Option<&Measure
         rows.push((format!("{name}, mean error"), mean(&b), mean(&a), "mm"));
         rows.push((format!("{name}, largest error"), most(&b), most(&a), "mm"));
     }
-    for (name, drive) in &result.drives {
+    for (name, drive) in result.drives.iter().filter(|(n, _)| !repeated(out, n)) {
         let of = |m: Option<&Measures>| m.and_then(|m| m.drives.get(name)).map(|d| d.parts().1);
         let (what, _, unit) = drive.parts();
         rows.push((format!("{name}, {what}"), of(before), of(after), unit));

@@ -116,6 +116,7 @@ impl<'a> Evaluator<'a> {
         }
         self.mirrors(&sheet, &mut parts);
         self.same_cycles(&parts);
+        self.same_stuff(&parts);
         let requirements = queries
             .requires
             .iter()
@@ -348,6 +349,29 @@ impl<'a> Evaluator<'a> {
                 .label(format!("{} steps over {} s", c.steps, c.duration_s))
                 .also(a.origin, format!("{} steps over {} s", a.steps, a.duration_s))
                 .help("what stands in one assembly moves in one time: give both the same `cycle`"),
+            );
+        }
+    }
+
+    /// What is printed as one is of one material, on one machine.
+    fn same_stuff(&mut self, parts: &Parts) {
+        let of = |i: usize| parts.designs.get(parts.instances.get(i)?.design);
+        for joined in &parts.joined {
+            let mut designs = joined.members.iter().filter_map(|(i, _)| Some((*i, of(*i)?)));
+            let Some((first, one)) = designs.next() else { continue };
+            let differs = |d: &Design| d.material != one.material || d.process != one.process;
+            let Some((i, other)) = designs.find(|(_, d)| differs(d)) else { continue };
+            let at = |i: usize| parts.instances.get(i).map_or(joined.origin, |n| n.origin);
+            let made = |d: &Design| format!("of `{}` on `{}`", d.material.name, d.process.name);
+            self.out.push(
+                Diagnostic::error(
+                    codes::MIXED,
+                    format!("`{}` cannot be one body of two materials or processes", joined.name),
+                    at(i),
+                )
+                .label(made(other))
+                .also(at(first), made(one))
+                .help("give both mechanisms the same `material` and `print on`, or leave the bodies apart"),
             );
         }
     }

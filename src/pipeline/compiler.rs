@@ -172,11 +172,11 @@ impl Stages for Compiler {
         let (parts, findings) = joined::parts(assembly, &built)?;
         found.extend(findings);
         let mut artefacts = Vec::new();
-        for (name, mesh) in &parts {
-            let bytes = stl_bytes(mesh).map_err(|e| {
+        for part in &parts {
+            let bytes = stl_bytes(&part.mesh).map_err(|e| {
                 vec![Diagnostic::error("E0631", format!("no STL can be written: {e}"), assembly.origin)]
             })?;
-            artefacts.push(Artefact { name: format!("{name}.stl"), bytes });
+            artefacts.push(Artefact { name: format!("{}.stl", part.name), bytes });
         }
         Ok((artefacts, found))
     }

@@ -14,17 +14,25 @@ pub struct Solid {
     pub parts: Parts,
 }
 
-/// Names and solids of all printed parts, and findings that do not stop the work.
+/// A part of an instance: indices of both.
+type PartOf = (usize, usize);
+
+/// A printed part.
+pub struct Printed {
+    /// Name of its file.
+    pub name: String,
+    /// Closed solids, in place.
+    pub mesh: Mesh,
+}
+
+/// All printed parts, and findings that do not stop the work.
 ///
 /// # Errors
 /// Where parts cannot be united.
-pub fn parts(
-    assembly: &Assembly,
-    solids: &[Solid],
-) -> Result<(Vec<(String, Mesh)>, Vec<Diagnostic>), Failed> {
+pub fn parts(assembly: &Assembly, solids: &[Solid]) -> Result<(Vec<Printed>, Vec<Diagnostic>), Failed> {
     let (mut out, mut found) = (Vec::new(), Vec::new());
     for group in groups(assembly, solids) {
-        let share = |&(i, p): &(usize, usize)| {
+        let share = |&(i, p): &PartOf| {
             let instance = assembly.instances.get(i)?;
             let solid = solids.get(instance.design)?;
             let part = solid.parts.parts.get(p)?;
@@ -55,7 +63,8 @@ pub fn parts(
             );
         }
         for (k, mesh) in pieces.into_iter().enumerate() {
-            out.push((if k == 0 { name.clone() } else { format!("{name}_{}", k + 1) }, mesh));
+            let name = if k == 0 { name.clone() } else { format!("{name}_{}", k + 1) };
+            out.push(Printed { name, mesh });
         }
     }
     found.extend(in_the_way(assembly, solids));
@@ -67,33 +76,38 @@ fn joint_body(assembly: &Assembly, instance: usize, body: usize) -> Option<usize
     assembly.joined.iter().position(|j| j.members.contains(&(instance, body)))
 }
 
-/// Parts (instance, part) that have bodies in common, in the order of their first members.
-fn groups(assembly: &Assembly, solids: &[Solid]) -> Vec<Vec<(usize, usize)>> {
-    let mut groups: Vec<(Vec<usize>, Vec<(usize, usize)>)> = Vec::new();
+/// Parts that have bodies in common, in the order of their first members.
+fn groups(assembly: &Assembly, solids: &[Solid]) -> Vec<Vec<PartOf>> {
+    /// Common bodies, and the parts they are in.
+    #[derive(Default)]
+    struct Group {
+        bodies: Vec<usize>,
+        members: Vec<PartOf>,
+    }
+    let mut groups: Vec<Group> = Vec::new();
     for (i, instance) in assembly.instances.iter().enumerate() {
         let parts = solids.get(instance.design).map(|s| s.parts.parts.as_slice()).unwrap_or_default();
         for (p, part) in parts.iter().enumerate() {
-            let mut joints: Vec<usize> =
-                part.bodies.iter().filter_map(|b| joint_body(assembly, i, *b)).collect();
-            let mut members = vec![(i, p)];
-            let meets = |g: &(Vec<usize>, Vec<(usize, usize)>)| g.0.iter().any(|j| joints.contains(j));
-            let (touched, rest): (Vec<_>, Vec<_>) = groups.drain(..).partition(meets);
-            for (j, m) in touched {
-                joints.extend(j);
-                members.extend(m);
+            let bodies = part.bodies.iter().filter_map(|b| joint_body(assembly, i, *b)).collect();
+            let mut group = Group { bodies, members: vec![(i, p)] };
+            let meets = |g: &Group| g.bodies.iter().any(|j| group.bodies.contains(j));
+            let (touched, rest): (Vec<Group>, Vec<Group>) = groups.into_iter().partition(meets);
+            for other in touched {
+                group.bodies.extend(other.bodies);
+                group.members.extend(other.members);
             }
-            members.sort_unstable();
+            group.members.sort_unstable();
             groups = rest;
-            groups.push((joints, members));
+            groups.push(group);
         }
     }
-    let mut out: Vec<Vec<(usize, usize)>> = groups.into_iter().map(|g| g.1).collect();
+    let mut out: Vec<Vec<PartOf>> = groups.into_iter().map(|g| g.members).collect();
     out.sort();
     out
 }
 
 /// What a group of parts is called, and what declares it.
-fn name(assembly: &Assembly, solids: &[Solid], group: &[(usize, usize)]) -> (String, crate::ir::Origin) {
+fn name(assembly: &Assembly, solids: &[Solid], group: &[PartOf]) -> (String, crate::ir::Origin) {
     let Some((i, p)) = group.first() else { return (assembly.name.clone(), assembly.origin) };
     let Some(instance) = assembly.instances.get(*i) else { return (assembly.name.clone(), assembly.origin) };
     let part_of = |i: usize, p: usize| {

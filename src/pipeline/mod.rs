@@ -215,6 +215,9 @@ fn solve_all(
     let mut origins = Vec::new();
     let mut solved: Vec<(String, Lock)> = Vec::new();
     for (design, lock) in assembly.designs.iter().zip(locks) {
+        if assembly.designs.len() > 1 {
+            progress.design(&design.name);
+        }
         let solution = solve(request, design, lock, stages, progress, cancel, out)?;
         origins.push(out.solved_from);
         solved.push((design.name.clone(), Lock::new(design, solution)));

@@ -277,11 +277,14 @@ impl Parser<'_> {
         self.once(&format!("{key} {name}"), at);
         let head = self.lock.named.entry(name.into()).or_default();
         let read = match key {
-            "design" => Some(head.design = value.into()).filter(|()| is_digest(value)),
-            "iterations" => value.parse().map(|n| head.iterations = n).ok(),
-            _ => value.parse().map(|yes| head.converged = yes).ok(),
+            "design" => {
+                head.design = value.into();
+                is_digest(value)
+            }
+            "iterations" => value.parse().map(|n| head.iterations = n).is_ok(),
+            _ => value.parse().map(|yes| head.converged = yes).is_ok(),
         };
-        if read.is_none() {
+        if !read {
             self.fail("E0703", format!("`{key} {name}` has a value that cannot be read"), at);
         }
     }
