@@ -66,9 +66,9 @@ codes! {
     EXPORT "E0415" "an export that lacks what it needs";
     KEYS "E0416" "keys of a drive that do not run from 0 % to 100 %";
     NOT_DRIVEN "E0417" "a drive of a joint that has no single value";
-    CYCLES_DIFFER "E0440" "instances whose cycles differ";
-    SHARED "E0441" "a body that a mirrored instance cannot share";
-    MIXED "E0442" "one body of two materials or processes";
+    CYCLES_DIFFER "E0460" "instances whose cycles differ";
+    SHARED "E0461" "a body that a mirrored instance cannot share";
+    MIXED "E0462" "one body of two materials or processes";
     LATER_STATEMENT "E0901" "a statement that is not available yet";
     LATER_TERM "E0902" "an objective, query, export or function that is not available yet";
     LATER_JOINT "E0903" "a kind of joint that is not available yet";
