@@ -274,3 +274,31 @@ fn tracking_alone_follows_within_twenty_iterations() {
     assert!(after.mean_error_mm < 0.02, "{after:?}");
     assert!(after.max_error_mm < 0.06, "{after:?}");
 }
+
+/// What the shipped design measures at other numbers of edges: the table at the end of `docs/optimizer.md`.
+/// `cargo test --release --test example last_digit -- --ignored --nocapture`
+#[test]
+#[ignore = "prints a table"]
+fn last_digit() {
+    let out = pipeline::check(&request(), &Compiler::default(), &ExampleFiles);
+    let design = out.design.unwrap();
+    let lock = flexura::emit::lock::Lock::parse(&example("chebyshev.lock"), 0).unwrap();
+    let p = lock.start_values(&design);
+    let layout = Layout::new(&design, &solve_motion(&design, &p).unwrap(), &p);
+    for edges in [10, 20, 40, 80, 160] {
+        let model = Model::new(&design, &layout, &p, edges, false).unwrap();
+        let cycle = flexura::equilibrium::sweep(&model).unwrap();
+        let counted = &cycle.states[..layout.counted_states()];
+        let trace = &layout.traces[0];
+        let errors: Vec<f64> = counted
+            .iter()
+            .zip(&trace.target)
+            .map(|(s, target)| (s.state.poses[trace.body].point(&trace.rest) - target).norm())
+            .collect();
+        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+        let most = errors.iter().copied().fold(0.0, f64::max);
+        let stress = counted.iter().map(|s| s.max_stress_mpa(&model)).fold(0.0, f64::max);
+        let torque = counted.iter().map(|s| s.drive_load(&model, 0).abs()).fold(0.0, f64::max);
+        println!("| {edges} | {mean:.3} | {most:.3} | {stress:.2} | {torque:.3} |");
+    }
+}

@@ -239,6 +239,7 @@ fn a_body_in_the_cranks_way_is_found_at_the_right_state() {
     input.bodies[BASE].eyes.push(flexura::geometry::Eye {
         joint: 9,
         point: Vector3::new(20.0, 0.0, -HEIGHT - CLEARANCE),
+        axis: Vector3::z(),
         bore: Bore::Solid,
         slot: (0, 1),
     });
@@ -299,7 +300,7 @@ fn stl_reads_back_closed() {
 fn meaningless_input_is_an_error() {
     let good = input(0.0, Facets::default());
     let broken: [fn(&mut PartsInput); 6] = [
-        |i| i.axis = Vector3::new(0.0, 0.0, 2.0),
+        |i| i.bodies[0].axis = Some(Vector3::new(0.0, 0.0, 2.0)),
         |i| i.height_mm = f64::NAN,
         |i| i.bodies[0].skeleton[0].x = f64::INFINITY,
         |i| i.bodies[0].eyes[0].slot = (2, 2),

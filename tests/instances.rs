@@ -54,8 +54,8 @@ impl Stages for Counted {
     ) -> Checked {
         self.compiler.check(source, set, steps, files)
     }
-    fn rigid(&self, design: &Design) -> Result<Simulation, Failed> {
-        self.compiler.rigid(design)
+    fn rigid(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
+        self.compiler.rigid(design, values)
     }
     fn simulate(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
         self.simulated.set(self.simulated.get() + 1);
@@ -401,16 +401,23 @@ fn merged_grounds_are_one_part() {
 fn a_bore_stays_open_in_a_merged_body() {
     let v = Vector3::new;
     let bar = |points: [Vector3<f64>; 2], bored: bool| {
-        let at =
-            Eye { joint: 0, point: v(0.0, 0.0, 0.0), bore: Bore::Through { diameter_mm: 5.0 }, slot: (0, 1) };
+        let at = Eye {
+            joint: 0,
+            point: v(0.0, 0.0, 0.0),
+            axis: v(0.0, 0.0, 1.0),
+            bore: Bore::Through { diameter_mm: 5.0 },
+            slot: (0, 1),
+        };
         let body = BodySolid {
             name: "base".into(),
             level_mm: 0.0,
             skeleton: points.to_vec(),
             eyes: if bored { vec![at] } else { Vec::new() },
+            axis: Some(v(0.0, 0.0, 1.0)),
+            ..BodySolid::default()
         };
         build_parts(&PartsInput {
-            axis: v(0.0, 0.0, 1.0),
+            motion: Vec::new(),
             height_mm: 8.0,
             clearance_mm: 0.3,
             least_wall_mm: 0.6,

@@ -192,7 +192,7 @@ fn sensitivities_hold_with_idle_freedoms_and_redundant_rows() {
 #[test]
 fn only_printing_asks_for_what_is_not_there() {
     for (text, count, word) in
-        [(dragon(), 1, "ball"), (jansen(), 3, "more than two bodies"), (hand(), 1, "slider")]
+        [(dragon(), 1, "conventional ball"), (car(), 2, "conventional ball"), (eye(), 5, "conventional")]
     {
         let text = text.replace("    trace ", "    export stl\n    trace ");
         let request = Request { source: "main.mech".into(), steps: Some(8), ..Request::default() };

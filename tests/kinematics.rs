@@ -26,10 +26,13 @@ impl Builder {
             free: Vec::new(),
             bodies: Vec::new(),
             joints: Vec::new(),
+            model: Default::default(),
             rods: Vec::new(),
             drives: Vec::new(),
+            loads: Vec::new(),
             cycle: Cycle { steps: 60, duration_s: 2.0, origin: origin(9, 0) },
             traces: Vec::new(),
+            aims: Default::default(),
             objectives: Vec::new(),
             requirements: Vec::new(),
             material: Material {
@@ -56,7 +59,8 @@ impl Builder {
     fn body(&mut self, name: &str, ground: bool, layer: i32) -> usize {
         let id = self.0.bodies.len();
         let skeleton: Vec<NamedPoint> = Vec::new();
-        self.0.bodies.push(Body { name: name.into(), ground, skeleton, layer, origin: origin(1, id) });
+        let origin = origin(1, id);
+        self.0.bodies.push(Body { name: name.into(), ground, skeleton, layer, owner: None, origin });
         id
     }
 
@@ -99,6 +103,7 @@ impl Builder {
             unit: DriveUnit::Rad,
             profile: Profile::Range { from: from_deg.to_radians(), to: to_deg.to_radians() },
             rest: rest_deg.to_radians(),
+            free_rest: None,
             motor: None,
             continuous: true,
             origin: origin(3, id),

@@ -29,16 +29,6 @@ fn at<'d>(problem: &Problem<'d>, design: &Design, seed: u64) -> (Trial<'d>, Norm
     (trial, normal.normal)
 }
 
-/// Numbers in −1..1, the same for the same seed.
-fn noise(seed: u64, n: usize) -> Vec<f64> {
-    let mut s = seed;
-    let mut next = || {
-        s = s.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        2.0 * ((s >> 11) as f64 / (1u64 << 53) as f64) - 1.0
-    };
-    (0..n).map(|_| next()).collect()
-}
-
 /// Gradient against five-point differences along random directions that move every parameter.
 fn check_gradient(kind: ObjectiveKind) {
     let (design, layout) = with_terms(6, &[kind]);
@@ -51,7 +41,7 @@ fn check_gradient(kind: ObjectiveKind) {
         assert!(scale > 1e-3 * trial.cost, "the gradient must act: {scale}");
         let h = 1e-4;
         for k in 0..4 {
-            let direction = noise(100 * seed + k, trial.x.len());
+            let direction = common::noise(100 * seed + k, trial.x.len());
             let value = |factor: f64| {
                 let x: Vec<f64> = trial.x.iter().zip(&direction).map(|(x, d)| x + factor * h * d).collect();
                 problem.simulate(&x).unwrap().cost
@@ -87,6 +77,15 @@ fn sway() {
 #[test]
 fn stress() {
     check_gradient(ObjectiveKind::Stress { scale_mpa: Some(10.0) });
+}
+
+/// Links and flexures that must keep far apart: every kind of pair acts, link with link, flexure with link, flexure
+/// with flexure.
+#[test]
+fn collision() {
+    for gap_mm in [4.0, 12.0] {
+        check_gradient(ObjectiveKind::Collision { gap_mm });
+    }
 }
 
 /// A soft maximum lies below the true one by at most what its sharpness allows, whatever the step count.

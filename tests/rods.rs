@@ -145,6 +145,8 @@ fn bend45(edges: usize) -> Rows {
         axis: Vector3::z(),
         a: 0.5,
         b: 0.5,
+        a_to: 0.5,
+        b_to: 0.5,
     };
     let mut rows = Rows::new();
     for (name, j) in

@@ -90,6 +90,18 @@ fn measures(text: &mut String, out: &BuildOutcome, style: Style) {
         rows.push((format!("{name}, mean error"), mean(&b), mean(&a), "mm"));
         rows.push((format!("{name}, largest error"), most(&b), most(&a), "mm"));
     }
+    for name in result.directions.keys().filter(|n| !repeated(out, n)) {
+        let of = |m: Option<&Measures>| m.and_then(|m| m.directions.get(name)).cloned();
+        let (b, a) = (of(before), of(after));
+        let mean = |d: &Option<flexura::pipeline::DirectionMeasures>| d.as_ref().map(|d| d.mean_error_deg);
+        let most = |d: &Option<flexura::pipeline::DirectionMeasures>| d.as_ref().map(|d| d.max_error_deg);
+        rows.push((format!("{name}, mean error"), mean(&b), mean(&a), "deg"));
+        rows.push((format!("{name}, largest error"), most(&b), most(&a), "deg"));
+    }
+    for name in result.outputs.keys().filter(|n| !repeated(out, n)) {
+        let of = |m: Option<&Measures>| m.and_then(|m| m.outputs.get(name)).map(|o| o.span_deg);
+        rows.push((format!("{name}, span"), of(before), of(after), "deg"));
+    }
     for (name, drive) in result.drives.iter().filter(|(n, _)| !repeated(out, n)) {
         let of = |m: Option<&Measures>| m.and_then(|m| m.drives.get(name)).map(|d| d.parts().1);
         let (what, _, unit) = drive.parts();
@@ -140,7 +152,8 @@ fn artefacts(text: &mut String, written: &[(String, usize)], style: Style) {
 }
 
 fn number(value: Option<f64>) -> String {
-    value.map_or("-".into(), |v| format!("{v:.3}"))
+    // What has no target has no error.
+    value.filter(|v| v.is_finite()).map_or("-".into(), |v| format!("{v:.3}"))
 }
 
 fn size(bytes: usize) -> String {

@@ -86,7 +86,7 @@ struct Build {
     /// Iterations of the optimiser at most; the best point found is kept
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(0..=100_000))]
     iterations: u32,
-    /// Which optimiser; both keep the bounds
+    /// Which optimiser; all keep the bounds
     #[arg(long, value_enum, default_value_t = Optimizer::Lm)]
     optimizer: Optimizer,
 }
@@ -97,6 +97,8 @@ enum Optimizer {
     Lm,
     /// L-BFGS: uses gradients only; for comparison with the literature
     Lbfgs,
+    /// CMA-ES: uses values only; for comparison with the literature
+    CmaEs,
 }
 
 impl From<Optimizer> for flexura::optimize::Method {
@@ -104,6 +106,7 @@ impl From<Optimizer> for flexura::optimize::Method {
         match optimizer {
             Optimizer::Lm => Self::LevenbergMarquardt,
             Optimizer::Lbfgs => Self::Lbfgs,
+            Optimizer::CmaEs => Self::CmaEs,
         }
     }
 }

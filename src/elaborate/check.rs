@@ -152,7 +152,7 @@ impl<'a> Evaluator<'a> {
 
     /// Where a free variable that a node depends on is declared.
     pub(super) fn free_behind(&self, id: ExprId) -> Option<Origin> {
-        let first = super::graph::free_variables(&self.exprs, &[id]).into_iter().next()?;
+        let first = self.exprs.free_variables(&[id]).into_iter().next()?;
         self.free.get(first).map(|f| f.origin)
     }
 

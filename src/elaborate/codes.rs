@@ -53,7 +53,7 @@ codes! {
     MISSING "E0402" "a statement that every mechanism needs is missing";
     REPEATED "E0403" "a statement that may stand only once";
     NO_GROUND "E0404" "a mechanism without a ground body";
-    JOINT_BODIES "E0405" "a joint that does not connect two different bodies";
+    JOINT_BODIES "E0405" "bodies of a joint that are not different, or not those its flexure joins";
     WRONG_KIND "E0406" "a name of the wrong kind";
     TEMPLATE_KIND "E0407" "a template that does not replace this kind of joint";
     QUERY "E0408" "a requirement that does not compare a query with a quantity";
@@ -66,13 +66,19 @@ codes! {
     EXPORT "E0415" "an export that lacks what it needs";
     KEYS "E0416" "keys of a drive that do not run from 0 % to 100 %";
     NOT_DRIVEN "E0417" "a drive of a joint that has no single value";
+    MODEL "E0430" "a theory of flexures that does not exist";
+    TAPER "E0431" "a rod between sections of different shape";
+    NONCONSERVATIVE "E0440" "a moment whose work would depend on the way";
+    WEIGHTLESS "E0441" "gravity on a material that states no density";
+    NO_TARGET "E0442" "the error of a trace without a target";
+    TARGET "E0450" "a target that is no path";
+    EMPHASIS "E0451" "an emphasis that is negative, or zero all over the cycle";
     CYCLES_DIFFER "E0460" "instances whose cycles differ";
     SHARED "E0461" "a body that a mirrored instance cannot share";
     MIXED "E0462" "one body of two materials or processes";
     LATER_STATEMENT "E0901" "a statement that is not available yet";
     LATER_TERM "E0902" "an objective, query, export or function that is not available yet";
     LATER_JOINT "E0903" "a kind of joint that is not available yet";
-    LATER_FREE "E0904" "a `free` that is not available yet where it acts";
     UNUSED_IMPORT "W0101" "an import that is not used";
     IDLE_FREE "W0201" "a `free` value that nothing depends on";
 }

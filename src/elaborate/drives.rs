@@ -6,8 +6,9 @@ use super::eval::{Env, Evaluator, Failed, Outcome};
 use super::sheet::{DriveText, Sheet};
 use super::structure::Structure;
 use crate::diagnostic::Diagnostic;
+use crate::ir::expr::ExprId;
 use crate::ir::{Drive, DriveUnit, JointKind, MotorInterface};
-use crate::syntax::ast::{Expr, ExprKind, Ident};
+use crate::syntax::ast::{Expr, Ident};
 
 impl<'a> Evaluator<'a> {
     pub(super) fn drives(
@@ -53,7 +54,7 @@ impl<'a> Evaluator<'a> {
             };
             match out.iter_mut().find(|d| d.joint == joint) {
                 Some(drive) => match rest {
-                    Ok(v) => drive.rest = v,
+                    Ok((start, free)) => (drive.rest, drive.free_rest) = (start, free),
                     Err(Failed) => ok = Err(Failed),
                 },
                 // A drive that is wrong itself has been reported.
@@ -77,28 +78,26 @@ impl<'a> Evaluator<'a> {
         self.scopes.get(scope).is_some_and(|s| s.index.contains_key(&name.node))
     }
 
-    fn rest(&mut self, scope: usize, name: &Ident, value: &'a Expr) -> Outcome<f64> {
-        if let ExprKind::Free { .. } = value.kind {
-            return self.fail(
-                Diagnostic::error(codes::LATER_FREE, "a free rest pose is not available yet", value.at)
-                    .help(format!("write a number: `rest {} at 30 deg`", name.node)),
-            );
-        }
+    /// Value at the start of the free variables, and the expression if it depends on one.
+    fn rest(&mut self, scope: usize, name: &Ident, value: &'a Expr) -> Outcome<(f64, Option<ExprId>)> {
         let dimension = match self.sliders.contains(&name.node) {
             true => Dimension::LENGTH,
             false => Dimension::ANGLE,
         };
-        let id = self.eval_scalar(&Env::fixed(scope), value, dimension, "the rest value")?;
-        if self.exprs.as_constant(id).is_none()
-            && let Some(at) = self.free_behind(id)
-        {
+        let env = Env::named(scope, format!("{}.rest", name.node));
+        let id = self.eval_scalar(&env, value, dimension, "the rest value")?;
+        let start = self.start_value(id);
+        if !start.is_finite() {
             return self.fail(
-                Diagnostic::error(codes::LATER_FREE, "a free rest pose is not available yet", at)
-                    .label("this is free")
-                    .also(value.at, "the rest pose depends on it"),
+                Diagnostic::error(
+                    codes::NOT_FINITE,
+                    "the rest value is not finite at the start values",
+                    value.at,
+                )
+                .label("a division by zero, or a root of a negative number"),
             );
         }
-        self.fixed(id, value.at, "the rest value")
+        Ok((start, self.exprs.is_free(id).then_some(id)))
     }
 
     fn drive(
@@ -172,6 +171,7 @@ impl<'a> Evaluator<'a> {
             unit,
             profile,
             rest: 0.0,
+            free_rest: None,
             motor,
             continuous: text.continuous,
             origin: text.at,

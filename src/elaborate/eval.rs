@@ -82,6 +82,10 @@ pub struct Evaluator<'a> {
     pub(super) half_said: BTreeSet<String>,
     /// Where each node is: only looked up, never listed.
     interned: HashMap<(u8, u64, u64), ExprId>,
+    /// Nothing is driven: the conventional mechanism has no path.
+    pub(super) undriven: bool,
+    /// Directions, outputs and targets of the mechanism.
+    pub(super) aims: super::aims::AimNames,
     /// Names of the joints that slide.
     pub(super) sliders: BTreeSet<String>,
     /// Values of all nodes at the start values of the free variables, and those start values.
@@ -112,6 +116,8 @@ impl<'a> Evaluator<'a> {
             paths: BTreeSet::new(),
             half_said: BTreeSet::new(),
             interned: HashMap::new(),
+            undriven: false,
+            aims: super::aims::AimNames::default(),
             sliders: BTreeSet::new(),
             starts: (Vec::new(), Vec::new()),
             scale: 1.0,
@@ -208,6 +214,10 @@ impl<'a> Evaluator<'a> {
             }
             ExprKind::Call { function, arguments } => self.call(env, function, arguments, e.at),
             ExprKind::Free { start, lower, upper } => self.free_value(env, start, lower, upper, e.at),
+            ExprKind::About { .. } => self.fail(
+                Diagnostic::error(codes::TYPE, "`about` stands only in `angle(BODY about D)`", e.at)
+                    .help("write for instance `output curl = angle(distal about z)`"),
+            ),
             ExprKind::Broken => Err(Failed),
         }
     }

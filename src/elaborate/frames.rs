@@ -6,7 +6,7 @@ use super::eval::{Evaluator, Outcome};
 use super::sheet::Sheet;
 use super::structure::{SAME_POINT_MM, Structure};
 use crate::diagnostic::Diagnostic;
-use crate::ir::{ExprPoint, JointKind, Layers};
+use crate::ir::{ExprPoint, Joint, JointKind, Layers};
 
 /// Height of a link where the text is silent, mm.
 const DEFAULT_HEIGHT_MM: f64 = 12.0;
@@ -25,13 +25,31 @@ pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
+/// The part of the way from a joint to where a body lies that decides its end frame, mm.
+fn telling_part(joint: &Joint, way: [f64; 3]) -> f64 {
+    let [x, y, z] = joint.axis;
+    match (joint.kind, joint.second_axis) {
+        (JointKind::Ball, _) => norm(way),
+        (JointKind::Universal, Some([u, v, w])) => {
+            dot(way, [y * w - z * v, z * u - x * w, x * v - y * u]).abs()
+        }
+        _ => {
+            let along = dot(way, joint.axis);
+            norm(minus(way, joint.axis.map(|a| a * along)))
+        }
+    }
+}
+
 impl<'a> Evaluator<'a> {
     /// The frame of every template end must be determined: e1 points at the body's other joints, or at Q.
     pub(super) fn check_end_frames(&mut self, s: &Structure<'a>) {
         for (i, (joint, text)) in s.joints.iter().zip(&s.texts).enumerate() {
             let Some(template) = &text.template else { continue };
             let here = self.start_point(joint.point);
-            for b in &joint.bodies {
+            self.check_idle_toward(s, i);
+            // A slider's flexures all use the frame of its first body.
+            let framed = if joint.kind == JointKind::Slider { 1 } else { joint.bodies.len() };
+            for b in joint.bodies.iter().take(framed) {
                 let Some(body) = s.bodies.get(*b) else { continue };
                 let toward = joint.toward.iter().find(|(t, _)| t == b).map(|(_, q)| self.start_point(*q));
                 let others: Vec<[f64; 3]> = s
@@ -49,20 +67,19 @@ impl<'a> Evaluator<'a> {
                 let why = match target {
                     None => "it has no other joint".to_string(),
                     Some(q) => {
-                        let d = minus(q, here);
-                        let along = dot(d, joint.axis);
-                        let flat = [0, 1, 2].map(|k: usize| {
-                            d.get(k).copied().unwrap_or(0.0)
-                                - along * joint.axis.get(k).copied().unwrap_or(0.0)
-                        });
-                        if norm(flat) >= LEAST_E1_MM {
+                        if telling_part(joint, minus(q, here)) >= LEAST_E1_MM {
                             continue;
                         }
-                        if toward.is_some() {
-                            "that point lies on the joint's axis".to_string()
-                        } else {
-                            "the centre of its other joints lies on this joint's axis".to_string()
-                        }
+                        let what = match toward {
+                            Some(_) => "that point",
+                            None => "the centre of its other joints",
+                        };
+                        let place = match joint.kind {
+                            JointKind::Ball => "at the joint",
+                            JointKind::Universal => "in the plane of the joint's axes",
+                            _ => "on the joint's axis",
+                        };
+                        format!("{what} lies {place}")
                     }
                 };
                 let candidate = body
@@ -81,6 +98,21 @@ impl<'a> Evaluator<'a> {
                 self.out.push(d);
             }
         }
+    }
+
+    /// `into` of a body whose frame a slider's flexures do not use must not be overlooked.
+    fn check_idle_toward(&mut self, s: &Structure<'a>, joint: usize) {
+        let (Some(joint), Some(text)) = (s.joints.get(joint), s.texts.get(joint)) else { return };
+        let first = joint.bodies.first();
+        let idle = joint.toward.iter().position(|(b, _)| joint.kind == JointKind::Slider && Some(b) != first);
+        let Some((name, _)) = idle.and_then(|i| text.into.get(i)) else { return };
+        let of = first.and_then(|b| s.bodies.get(*b)).map_or("", |b| b.name.as_str());
+        let message =
+            format!("`into {}` has no effect: a slider's flexures are placed from `{of}`", name.node);
+        self.out.push(
+            Diagnostic::error(codes::MISPLACED, message, name.at)
+                .help(format!("write `into {of} toward …`, or exchange the two bodies")),
+        );
     }
 
     /// Stacking of the planar links.

@@ -39,10 +39,10 @@ impl<'a> Evaluator<'a> {
             return Ok(Value::Scalar(Scalar { id, dim }));
         }
         let Some(path) = &env.path else {
-            return self.fail(
-                Diagnostic::error(codes::FREE_PLACE, "nothing may be free here", at)
-                    .help("`free` stands in `param`, `let` and the overrides of a template"),
-            );
+            return self
+                .fail(Diagnostic::error(codes::FREE_PLACE, "nothing may be free here", at).help(
+                    "`free` stands in `param`, `let`, `point`, `rest` and the overrides of a template",
+                ));
         };
         let mut bounds = [0.0; 3];
         for (slot, (id, e)) in bounds.iter_mut().zip([(id, start), (lower_id, lower), (upper_id, upper)]) {

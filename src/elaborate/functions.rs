@@ -18,16 +18,20 @@ const FUNCTIONS: &[&str] = &[
 /// Functions that exist elsewhere: in objectives, requirements, templates and exports.
 const ELSEWHERE: &[(&str, &str)] = &[
     ("cyl", "`cyl` places the ends of a template's rods"),
+    ("sph", "`sph` places the ends of a template's rods"),
     ("ellipse", "`ellipse` is the section of a template's rod"),
     ("track", "`track` is a term of `minimize`"),
     ("stress", "`stress()` stands in `minimize`, or inside `max(…)` in `require`"),
     ("error", "`error(trace)` stands inside `max(…)` or `mean(…)` in `require`"),
     ("torque", "`torque(drive)` stands inside `max(…)` in `require`"),
     ("arduino", "`arduino` is an export"),
+    ("angle", "`angle(BODY about D)` stands in an `output`, or inside `span(…)` in `require`"),
+    ("path", "`path(\"FILE.csv\")` is a `target` of a trace"),
+    ("points", "`points(P, Q, …)` is a `target` of a trace"),
 ];
 
 /// Functions of the target language that this version does not have.
-const LATER: &[&str] = &["sph", "angle", "path", "mirror", "turn"];
+const LATER: &[&str] = &["mirror", "turn"];
 
 /// Circles that miss by less than this part of their radii touch: room for a few hundred roundings
 /// (1.1e-16 each) in the points they are drawn from.

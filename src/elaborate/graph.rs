@@ -2,7 +2,6 @@
 //! part of the design uses.
 
 use crate::ir::expr::{ExprGraph, ExprId, Node};
-use std::collections::BTreeSet;
 
 fn with_operands(node: &Node, f: impl Fn(ExprId) -> ExprId) -> Node {
     match *node {
@@ -27,44 +26,9 @@ fn with_operands(node: &Node, f: impl Fn(ExprId) -> ExprId) -> Node {
     }
 }
 
-/// Marks every node that `roots` depend on. Operands stand earlier, so one pass backwards is enough.
-fn reachable(graph: &ExprGraph, roots: &[ExprId]) -> Vec<bool> {
-    let mut seen = vec![false; graph.nodes.len()];
-    let mark = |seen: &mut Vec<bool>, id: ExprId| {
-        if let Some(s) = seen.get_mut(id.0 as usize) {
-            *s = true;
-        }
-    };
-    for r in roots {
-        mark(&mut seen, *r);
-    }
-    for i in (0..graph.nodes.len()).rev() {
-        if seen.get(i).copied().unwrap_or(false)
-            && let Some(node) = graph.nodes.get(i)
-        {
-            for id in node.operands().into_iter().flatten() {
-                mark(&mut seen, id);
-            }
-        }
-    }
-    seen
-}
-
-/// Indices of the free variables that `roots` depend on.
-pub fn free_variables(graph: &ExprGraph, roots: &[ExprId]) -> BTreeSet<usize> {
-    let seen = reachable(graph, roots);
-    let mut out = BTreeSet::new();
-    for (node, seen) in graph.nodes.iter().zip(seen) {
-        if let (Node::Free(i), true) = (node, seen) {
-            out.insert(*i as usize);
-        }
-    }
-    out
-}
-
 /// The graph of what `roots` need, and the new place of every node (none: dropped).
 pub fn prune(graph: &ExprGraph, roots: &[ExprId]) -> (ExprGraph, Vec<Option<ExprId>>) {
-    let seen = reachable(graph, roots);
+    let seen = graph.reachable(roots);
     let mut out = ExprGraph::default();
     let mut place: Vec<Option<ExprId>> = Vec::with_capacity(graph.nodes.len());
     for (node, seen) in graph.nodes.iter().zip(seen) {
@@ -97,6 +61,6 @@ mod tests {
         let at = place[p.0 as usize].unwrap();
         let v = [0.3, 2.0];
         assert_eq!(small.values(&v)[at.0 as usize], g.values(&v)[p.0 as usize]);
-        assert_eq!(free_variables(&g, &[s]).into_iter().collect::<Vec<_>>(), [0]);
+        assert_eq!(g.free_variables(&[s]).into_iter().collect::<Vec<_>>(), [0]);
     }
 }

@@ -7,6 +7,7 @@ use super::load::Program;
 use super::mechanism::{Outside, quote};
 use super::placing;
 use super::queries::{Queries, Query, drive_texts};
+use super::scope::{Local, LocalKind, State};
 use super::settings::Settings;
 use super::sheet::Sheet;
 use crate::diagnostic::{Diagnostic, Origin};
@@ -110,7 +111,7 @@ impl<'a> Evaluator<'a> {
         let mut parts = Parts::default();
         self.limit(sheet.places.len() + sheet.mirrors.len(), "instances", m.name.at).ok()?;
         for (place, at) in &sheet.places {
-            if self.place(scope, place, *at, outside, &grounds, &mut parts).is_err() {
+            if self.put(scope, place, *at, outside, &grounds, &mut parts).is_err() {
                 parts.failed.insert(place.name.node.clone());
             }
         }
@@ -154,6 +155,10 @@ impl<'a> Evaluator<'a> {
                 StatementKind::Rest { .. } => "rest",
                 StatementKind::Trace { .. } => "trace",
                 StatementKind::Minimize(_) => "minimize",
+                StatementKind::Load(_) => "load",
+                StatementKind::Output { .. } => "output",
+                StatementKind::Target { .. } => "target",
+                StatementKind::Model(_) => "links model",
                 _ => continue,
             };
             let message = format!("`{what}` beside instances is not available yet");
@@ -170,7 +175,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    fn place(
+    fn put(
         &mut self,
         scope: usize,
         place: &'a ast::Place,
@@ -266,7 +271,8 @@ impl<'a> Evaluator<'a> {
         }
         let mut inner = Evaluator::new(self.program, &settings);
         inner.scale = scale;
-        let own = Outside { module: item.0, steps: outside.steps, sources: outside.sources };
+        let own =
+            Outside { module: item.0, steps: outside.steps, sources: outside.sources, files: outside.files };
         let made = inner.mechanism(m, &own);
         inner.unused_settings();
         let bad = inner.out.iter().any(Diagnostic::is_error);
@@ -405,12 +411,39 @@ impl<'a> Evaluator<'a> {
     fn inside(&mut self, design: Option<&Design>) -> (BTreeMap<String, usize>, BTreeMap<String, usize>) {
         let none = (BTreeMap::new(), BTreeMap::new());
         self.sliders.clear();
+        self.aims = design.map(super::aims::AimNames::of).unwrap_or_default();
         let Some(d) = design else { return none };
         let sliding = d.joints.iter().filter(|j| j.kind == JointKind::Slider);
         self.sliders.extend(sliding.map(|j| j.name.clone()));
         let traces = d.traces.iter().enumerate().map(|(i, t)| (t.name.clone(), i)).collect();
         let drives = d.drives.iter().enumerate().map(|(i, t)| (t.name.clone(), i)).collect();
         (traces, drives)
+    }
+
+    /// The names of the assembly and, as things, those of an instance that queries tell apart by their kind.
+    fn scope_inside(&mut self, scope: usize) -> usize {
+        let Some(outer) = self.scopes.get(scope) else { return scope };
+        let module = outer.module;
+        let copy = |l: &Local<'a>| Local {
+            name: l.name.clone(),
+            at: l.at,
+            kind: l.kind.clone(),
+            state: l.state.clone(),
+        };
+        let mut locals: Vec<Local<'a>> = outer.locals.iter().map(copy).collect();
+        let outputs = self.aims.outputs.keys().map(|n| (n.clone(), "output"));
+        let directions = self.aims.directions.keys().map(|n| (n.clone(), "direction"));
+        for (name, kind) in outputs.chain(directions) {
+            locals.retain(|l| l.name != name);
+            let (kind, at) = (LocalKind::Thing(kind), Origin::default());
+            locals.push(Local { name, at, kind, state: State::Waiting });
+        }
+        let inner = self.scope(module);
+        if let Some(s) = self.scopes.get_mut(inner) {
+            s.index = locals.iter().enumerate().map(|(i, l)| (l.name.clone(), i)).collect();
+            s.locals = locals;
+        }
+        inner
     }
 
     fn instance_requirement(
@@ -426,7 +459,8 @@ impl<'a> Evaluator<'a> {
         let (left, op, right) = &query.text;
         let text = super::sheet::RequireText { left, op: *op, right, at: query.at };
         let line = quote(outside.sources, query.at);
-        let requirement = self.requirement(scope, &text, &traces, &drives, &line)?;
+        let inner = self.scope_inside(scope);
+        let requirement = self.requirement(inner, &text, &traces, &drives, &line)?;
         match (instance, &requirement.quantity) {
             (None, Quantity::Gap) => self.fail(
                 Diagnostic::error(

@@ -400,6 +400,17 @@ fn refused(path: &str, at: Origin, why: &str) -> Diagnostic {
 
 /// Why a path may not be imported.
 fn forbidden(path: &str) -> Option<&'static str> {
+    if let Some(why) = leads_out(path) {
+        return Some(why);
+    }
+    if !path.ends_with(".mech") {
+        return Some("only `.mech` files can be imported");
+    }
+    None
+}
+
+/// Why a path could lead out of the design's folder, or is none.
+pub(super) fn leads_out(path: &str) -> Option<&'static str> {
     if path.is_empty() || path.len() > 512 {
         return Some("not a file name");
     }
@@ -411,9 +422,6 @@ fn forbidden(path: &str) -> Option<&'static str> {
     }
     if path.chars().any(char::is_control) {
         return Some("the path contains control characters");
-    }
-    if !path.ends_with(".mech") {
-        return Some("only `.mech` files can be imported");
     }
     None
 }

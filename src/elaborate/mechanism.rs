@@ -10,7 +10,7 @@ use super::terms::Named;
 use super::value::ItemRef;
 use crate::diagnostic::{Diagnostic, Origin, SourceMap};
 use crate::ir::expr::ExprId;
-use crate::ir::{Design, Drive, ExprPoint, Process, Realization, Rod, Section};
+use crate::ir::{Design, Drive, LoadKind, Process, Realization, Rod, Section};
 use crate::syntax::ast::Mechanism;
 use std::collections::BTreeMap;
 
@@ -22,6 +22,8 @@ pub struct Outside<'s> {
     pub steps: Option<usize>,
     /// Texts, to quote lines.
     pub sources: &'s SourceMap,
+    /// Files that targets are read from.
+    pub files: &'s dyn super::Files,
 }
 
 impl<'a> Evaluator<'a> {
@@ -53,14 +55,17 @@ impl<'a> Evaluator<'a> {
             let process = process.as_ref().map(|(item, _)| *item);
             self.flexures(scope, module, &mut s, process, layers.height_mm, &mut rods);
         }
+        let model = self.rod_model(&sheet);
         let cycle = match sheet.cycle {
             Some(_) => self.cycle(scope, &sheet, outside.steps).ok(),
             None => self.missing(&sheet, m, "cycle", "`cycle 60 steps over 2 s`"),
         };
-        if sheet.drives.is_empty() {
-            let _: Option<()> = self.missing(&sheet, m, "drive", "`drive J from 0 deg to 360 deg`");
+        if sheet.drives.is_empty() && sheet.loads.is_empty() {
+            let _: Option<()> = self.missing(&sheet, m, "drive or load", "`drive J from 0 deg to 360 deg`");
         }
         let drives = self.drives(scope, module, &sheet, &s).ok();
+        let weightless = material.as_ref().filter(|m| m.density_g_mm3.is_none()).map(|m| m.name.as_str());
+        let loads = self.loads(scope, &sheet, &s, weightless).ok();
         let mut traces = Vec::new();
         let mut trace_index = BTreeMap::new();
         for text in &sheet.traces {
@@ -69,6 +74,7 @@ impl<'a> Evaluator<'a> {
                 traces.push(t);
             }
         }
+        self.aims(scope, &sheet, &s, &trace_index, cycle.as_ref().map(|c| c.steps), outside);
         let driven = drive_names(&drives, &sheet);
         let named = Named { traces: &trace_index, driven: &driven, drives: drives.as_deref() };
         // Goals do not grow with the drawing.
@@ -86,8 +92,6 @@ impl<'a> Evaluator<'a> {
         for e in &sheet.exports {
             exports.extend(self.export(scope, e, &driven, &sheet.drives));
         }
-        let geometry = geometry_of(&s, &traces);
-        self.check_fixed_geometry(&geometry);
         self.as_is = false;
         if self.out.iter().any(Diagnostic::is_error) {
             return None;
@@ -99,9 +103,12 @@ impl<'a> Evaluator<'a> {
             bodies: s.bodies,
             joints: s.joints,
             rods,
+            model: model?,
             drives: drives?,
+            loads: loads?,
             cycle: cycle?,
             traces,
+            aims: std::mem::take(&mut self.aims.made),
             objectives,
             requirements,
             material: material?,
@@ -165,38 +172,17 @@ impl<'a> Evaluator<'a> {
                 joint: i,
                 statement: joint.origin,
                 bodies: &bodies,
+                layer: joint.layer,
                 kind: &text.kind.node,
                 shorter_link_mm,
                 layer_height_mm,
                 process,
             };
-            if let Ok(made) = self.template(scope, module, template, &site, rods)
+            if let Ok(made) = self.template(scope, module, template, &site, (rods, &mut s.bodies))
                 && let Some(joint) = s.joints.get_mut(i)
             {
                 joint.realization =
                     Realization::Compliant { template: template.name.node.clone(), rods: made };
-            }
-        }
-    }
-
-    /// The numerical stages differentiate flexures only: points must not be free for now.
-    fn check_fixed_geometry(&mut self, geometry: &[(ExprPoint, Origin)]) {
-        let mut reported = std::collections::BTreeSet::new();
-        for (p, place) in geometry {
-            for i in graph::free_variables(&self.exprs, p) {
-                if reported.insert(i)
-                    && let Some(f) = self.free.get(i)
-                {
-                    let d = Diagnostic::error(
-                        codes::LATER_FREE,
-                        "a free value that moves points of the mechanism is not available yet",
-                        f.origin,
-                    )
-                    .label(format!("`{}` is free", f.path))
-                    .also(*place, "this depends on it")
-                    .help("write a number here; values inside flexures can be free");
-                    self.out.push(d);
-                }
             }
         }
     }
@@ -206,7 +192,7 @@ impl<'a> Evaluator<'a> {
         let mut roots = Vec::new();
         each_expr(design, &mut |id| roots.push(*id));
         let (exprs, place) = graph::prune(&self.exprs, &roots);
-        let used = graph::free_variables(&self.exprs, &roots);
+        let used = self.exprs.free_variables(&roots);
         for (i, f) in design.free.iter().enumerate() {
             if !used.contains(&i) {
                 self.out.push(
@@ -228,10 +214,11 @@ impl<'a> Evaluator<'a> {
         let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
         let values = design.exprs.values(&start);
         for rod in &design.rods {
-            let [a, b] = rod.section.half_widths();
+            let mut widths =
+                std::iter::once(&rod.section).chain(&rod.section_to).flat_map(|s| s.half_widths());
             let ids = [rod.from.position, rod.from.derivative, rod.to.position, rod.to.derivative];
             let finite = |id: &ExprId| values.get(id.0 as usize).is_some_and(|v| v.is_finite());
-            if !(ids.iter().flatten().all(finite) && finite(&a) && finite(&b)) {
+            if !(ids.iter().flatten().all(finite) && widths.all(|id| finite(&id))) {
                 self.out.push(
                     Diagnostic::error(
                         codes::NOT_FINITE,
@@ -260,20 +247,6 @@ pub(super) fn quote(sources: &SourceMap, at: Origin) -> String {
     text.unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Every point that the conventional mechanism is made of.
-fn geometry_of(s: &Structure<'_>, traces: &[crate::ir::Trace]) -> Vec<(ExprPoint, Origin)> {
-    let mut out = Vec::new();
-    for j in &s.joints {
-        out.push((j.point, j.origin));
-        out.extend(j.toward.iter().map(|(_, p)| (*p, j.origin)));
-    }
-    for b in &s.bodies {
-        out.extend(b.skeleton.iter().map(|p| (p.position, b.origin)));
-    }
-    out.extend(traces.iter().map(|t| (t.point, t.origin)));
-    out
-}
-
 /// Visits every expression of a design.
 fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
     for b in &mut design.bodies {
@@ -288,15 +261,23 @@ fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
             end.position.iter_mut().for_each(&mut *f);
             end.derivative.iter_mut().for_each(&mut *f);
         }
-        match &mut r.section {
-            Section::Ellipse { a, b } | Section::Rect { a, b } => {
-                f(a);
-                f(b);
+        for section in std::iter::once(&mut r.section).chain(&mut r.section_to) {
+            match section {
+                Section::Ellipse { a, b } | Section::Rect { a, b } => {
+                    f(a);
+                    f(b);
+                }
+                Section::Round { r } => f(r),
             }
-            Section::Round { r } => f(r),
         }
     }
     for t in &mut design.traces {
         t.point.iter_mut().for_each(&mut *f);
+    }
+    design.drives.iter_mut().filter_map(|d| d.free_rest.as_mut()).for_each(&mut *f);
+    for load in &mut design.loads {
+        if let LoadKind::Force { point, .. } = &mut load.kind {
+            point.iter_mut().for_each(&mut *f);
+        }
     }
 }

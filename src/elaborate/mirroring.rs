@@ -190,6 +190,17 @@ impl<'a> Evaluator<'a> {
         if joint.is_compliant() || !joint.bodies.iter().all(|b| shared.contains(b)) {
             return Ok(Image { factor: 1.0, common: false });
         }
+        if drive.free_rest.is_some() || !design.exprs.free_variables(&joint.point).is_empty() {
+            return self.fail(
+                Diagnostic::error(
+                    codes::LATER_STATEMENT,
+                    "a free place or rest pose of a motor in common is not available yet",
+                    drive.origin,
+                )
+                .also(text.name.at, "in common with this image")
+                .help("write numbers for them, or share grounds only"),
+            );
+        }
         match along_plane(design, joint, from, to) {
             Some(along) => {
                 Ok(Image { factor: from.sense(joint.kind) * to.sense(joint.kind) * along, common: true })
@@ -236,10 +247,8 @@ impl<'a> Evaluator<'a> {
         }
         let mut other = design.clone();
         other.name = text.name.node.clone();
-        for (drive, image) in other.drives.iter_mut().zip(images).filter(|(_, i)| i.factor < 0.0) {
-            drive.profile = drive.profile.reversed();
-            drive.rest *= image.factor;
-        }
+        let Design { drives, exprs, .. } = &mut other;
+        drives.iter_mut().zip(images).filter(|(_, i)| i.factor < 0.0).for_each(|(d, _)| d.reverse(exprs));
         parts.designs.push(other);
         parts.items.extend(parts.items.get(source.design).copied());
         let index = parts.designs.len() - 1;
@@ -277,6 +286,11 @@ fn same_states(design: &Design, source: &Instance, images: &[Image]) -> Option<V
     let n = design.cycle.steps;
     let at = |d: &Drive, s: usize| d.value(s as f64 / n as f64);
     let values: Vec<Vec<f64>> = (0..=n).map(|s| drives.iter().map(|(d, _)| at(d, s)).collect()).collect();
+    // Loads keep their time: their sizes must agree too.
+    let sizes = |s: usize| design.loads.iter().map(move |l| l.size(s as f64 / n as f64));
+    let alike = |s: usize, k: usize| {
+        sizes(s).zip(sizes(k)).all(|(a, b)| (a - b).abs() <= SAME * a.abs().max(b.abs()))
+    };
     let meets = |s: usize, k: usize| {
         let pairs = values.get(s)?.iter().zip(values.get(k)?).zip(&drives);
         Some(pairs.into_iter().all(|((v, w), (d, f))| d.unit.closes(w - f * v)))
@@ -284,7 +298,7 @@ fn same_states(design: &Design, source: &Instance, images: &[Image]) -> Option<V
     (0..=n)
         .map(|s| {
             let here = source.state(s);
-            let found = (0..=n).filter(|k| meets(here, *k) == Some(true));
+            let found = (0..=n).filter(|k| alike(here, *k) && meets(here, *k) == Some(true));
             found.min_by_key(|k| (k.abs_diff(n - s), *k))
         })
         .collect()

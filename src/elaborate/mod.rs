@@ -3,12 +3,14 @@
 //! Everything that can be wrong with a text is said here, with its place; the numerical stages see
 //! only the design. No I/O: files come in through [`Files`].
 
+mod aims;
 mod arithmetic;
 mod check;
 pub mod codes;
 pub mod dimension;
 mod drives;
 mod eval;
+mod forms;
 mod frames;
 mod free;
 mod functions;
@@ -16,10 +18,13 @@ mod goals;
 mod graph;
 mod instances;
 mod load;
+mod loads;
 mod lookup;
 mod mechanism;
+mod members;
 mod mirroring;
 mod names;
+mod places;
 mod placing;
 mod profiles;
 mod queries;
@@ -30,8 +35,12 @@ mod scope;
 mod settings;
 mod sheet;
 mod structure;
+mod table;
+mod taper;
+mod targets;
 mod template;
 mod terms;
+mod theory;
 pub mod units;
 mod value;
 
@@ -120,7 +129,7 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
         return Elaborated { assembly: None, design: None, sources, diagnostics };
     };
     let (root_index, root_module) = module;
-    let outside = mechanism::Outside { module: root_index, steps: options.steps, sources: &sources };
+    let outside = mechanism::Outside { module: root_index, steps: options.steps, sources: &sources, files };
     let circular = placing::circles(&program, root_index, &mut diagnostics);
     let (mut assembly, mut used) = (None, std::collections::BTreeSet::new());
     let no_settings = Settings::default();

@@ -5,7 +5,7 @@ use super::dimension::Dimension;
 use super::eval::{Env, Evaluator, Failed, Outcome};
 use super::graph;
 use crate::diagnostic::{Diagnostic, Origin};
-use crate::ir::expr::Node;
+use crate::ir::expr::{ExprGraph, ExprId, Node};
 use crate::ir::{DriveUnit, Profile};
 use crate::syntax::ast::{self, Expr};
 
@@ -46,13 +46,32 @@ impl<'a> Evaluator<'a> {
                 let to = self.eval_fixed(scope, to, dimension, "the drive's end");
                 Ok(Profile::Range { from: from?, to: to? })
             }
-            ast::Profile::By(e) => self.expression(scope, e, dimension),
+            ast::Profile::By(e) => self.of_time(scope, e, dimension, ["a drive", "the drive's value"]),
             ast::Profile::Keys { smooth, keys, at } => self.keys(scope, *smooth, keys, *at, unit, dimension),
         }
     }
 
-    /// The expression gets a graph of its own, whose only variable is t.
-    fn expression(&mut self, scope: usize, e: &'a Expr, dimension: Dimension) -> Outcome<Profile> {
+    /// An expression of t, of something (`owner`, `what` of it) that must not depend on a free value.
+    pub(super) fn of_time(
+        &mut self,
+        scope: usize,
+        e: &'a Expr,
+        dimension: Dimension,
+        [owner, what]: [&str; 2],
+    ) -> Outcome<Profile> {
+        let (graph, [value]) =
+            self.over_time(scope, e, owner, |me, env| Ok([me.eval_scalar(env, e, dimension, what)?]))?;
+        Ok(Profile::Expression { graph, value })
+    }
+
+    /// What depends on t gets a graph of its own, whose only variable is t. `what` names what it is ("a drive").
+    pub(super) fn over_time<const N: usize>(
+        &mut self,
+        scope: usize,
+        e: &'a Expr,
+        what: &str,
+        work_out: impl FnOnce(&mut Self, &Env) -> Outcome<[ExprId; N]>,
+    ) -> Outcome<(ExprGraph, [ExprId; N])> {
         let declared = self.scopes.get(scope).and_then(|s| s.locals.get(*s.index.get(TIME)?)).map(|l| l.at);
         if let Some(at) = declared {
             return self.fail(
@@ -66,34 +85,29 @@ impl<'a> Evaluator<'a> {
         self.starts.1.resize(time, f64::NAN);
         self.starts.1.push(0.0);
         let t = self.node(Node::Free(time as u32), e.at);
-        let value = t.and_then(|t| {
-            let env = Env { time: Some(t), ..Env::fixed(scope) };
-            self.eval_scalar(&env, e, dimension, "the drive's value")
-        });
+        let value = t.and_then(|t| work_out(self, &Env { time: Some(t), ..Env::fixed(scope) }));
         self.starts.1.truncate(time);
         let value = value?;
-        let free = graph::free_variables(&self.exprs, &[value]).into_iter().find(|i| *i != time);
+        let free = self.exprs.free_variables(&value).into_iter().find(|i| *i != time);
         if let Some(free) = free {
-            let d = Diagnostic::error(
-                codes::NOT_FIXED,
-                "a drive must be fixed, this depends on a free value",
-                e.at,
-            );
+            let message = format!("{what} must be fixed, this depends on a free value");
+            let d = Diagnostic::error(codes::NOT_FIXED, message, e.at);
             return self.fail(match self.free.get(free) {
                 Some(f) => d.also(f.origin, "free here"),
                 None => d,
             });
         }
-        let (mut own, place) = graph::prune(&self.exprs, &[value]);
+        let (mut own, place) = graph::prune(&self.exprs, &value);
         for node in &mut own.nodes {
             if let Node::Free(i) = node {
                 *i = 0;
             }
         }
-        match place.get(value.0 as usize).copied().flatten() {
-            Some(value) => Ok(Profile::Expression { graph: own, value }),
-            None => Err(Failed),
+        let mut moved = value;
+        for id in &mut moved {
+            *id = place.get(id.0 as usize).copied().flatten().ok_or(Failed)?;
         }
+        Ok((own, moved))
     }
 
     fn keys(

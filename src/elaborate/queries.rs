@@ -103,6 +103,7 @@ fn stripped(e: &Expr, names: &BTreeSet<&str>, found: &mut Vec<Ident>) -> Expr {
             ExprKind::Binary(*op, Box::new(stripped(a, names, found)), Box::new(stripped(b, names, found)))
         }
         ExprKind::Tuple(items) => ExprKind::Tuple(items.iter().map(|i| stripped(i, names, found)).collect()),
+        ExprKind::About { .. } => e.kind.clone(),
         ExprKind::Number { .. } | ExprKind::Text(_) | ExprKind::Free { .. } | ExprKind::Broken => {
             e.kind.clone()
         }

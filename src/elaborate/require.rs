@@ -10,14 +10,16 @@ use crate::syntax::ast::{Argument, Compare, Expr, ExprKind, Ident};
 use std::collections::BTreeMap;
 
 const AGGREGATES: &[&str] = &["max", "min", "mean", "span", "at"];
-const LATER_QUANTITIES: &[&str] = &["tension", "buckling", "angle"];
-const QUANTITIES: &[&str] = &["error", "stress", "torque", "force", "gap"];
+const LATER_QUANTITIES: &[&str] = &["tension", "buckling"];
+const QUANTITIES: &[&str] = &["error", "stress", "torque", "force", "gap", "angle"];
 /// A query as written: `max(error(tip))`.
 struct Query<'a> {
     outer: Option<&'a Ident>,
     inner: &'a Ident,
     inner_arguments: &'a [Argument],
     time: Option<&'a Expr>,
+    /// It is the name of an output.
+    output: bool,
 }
 
 impl<'a> Evaluator<'a> {
@@ -29,7 +31,8 @@ impl<'a> Evaluator<'a> {
         drives: &BTreeMap<String, usize>,
         line: &str,
     ) -> Outcome<Requirement> {
-        let queries = [query(text.left), query(text.right)];
+        let is_output = |n: &Ident| self.is_thing(scope, n, "output");
+        let queries = [query(text.left, &is_output), query(text.right, &is_output)];
         let (found, bound, at_most) = match queries {
             [Some(q), None] => (q, text.right, matches!(text.op, Compare::LessEqual | Compare::Less)),
             [None, Some(q)] => (q, text.left, matches!(text.op, Compare::GreaterEqual | Compare::Greater)),
@@ -44,8 +47,9 @@ impl<'a> Evaluator<'a> {
                 );
             }
             [None, None] => {
-                if let Some(outer) = output_query(text.left).or(output_query(text.right)) {
-                    return self.later(codes::LATER_TERM, &format!("{}(OUTPUT)", outer.node), outer.at);
+                if let Some(name) = output_query(text.left).or(output_query(text.right)) {
+                    let outputs = self.aims.outputs.clone();
+                    return self.thing(scope, &outputs, name, "output").and(Err(Failed));
                 }
                 if matches!(text.left.kind, ExprKind::Broken) || matches!(text.right.kind, ExprKind::Broken) {
                     return Err(Failed);
@@ -61,7 +65,13 @@ impl<'a> Evaluator<'a> {
             }
         };
         let aggregate = self.aggregate(scope, &found);
-        let quantity = self.quantity(scope, found.inner, found.inner_arguments, traces, drives);
+        let quantity = if found.output {
+            let outputs = self.aims.outputs.clone();
+            let index = self.thing(scope, &outputs, found.inner, "output");
+            index.map(|i| (Quantity::Angle(i), Dimension::ANGLE))
+        } else {
+            self.quantity(scope, found.inner, found.inner_arguments, traces, drives)
+        };
         let (aggregate, (quantity, dim)) = (aggregate?, quantity?);
         let bound = self.eval_fixed(scope, bound, dim, "the bound")?;
         Ok(Requirement {
@@ -122,9 +132,27 @@ impl<'a> Evaluator<'a> {
     ) -> Outcome<(Quantity, Dimension)> {
         match name.node.as_str() {
             "error" => {
-                let slots = self.arguments(name, args, &["trace"], 1)?;
-                let trace = self.trace_argument(scope, slots.first().copied().flatten(), traces)?;
-                Ok((Quantity::Error(trace), Dimension::LENGTH))
+                let slots = self.arguments(name, args, &["trace", "form"], 1)?;
+                let form = slots.get(1).copied().flatten();
+                let closest = self.form(name, form, &["same_time", "closest"])? == Some("closest");
+                let of = self.plain_name(slots.first().copied().flatten(), "trace")?;
+                if self.is_thing(scope, of, "direction") {
+                    if let (true, Some(e)) = (closest, form) {
+                        return self.later(codes::LATER_TERM, "error(DIRECTION, form = closest)", e.at);
+                    }
+                    let directions = self.aims.directions.clone();
+                    let index = self.thing(scope, &directions, of, "direction")?;
+                    self.needs_target(name, &of.node)?;
+                    return Ok((Quantity::AimError(index), Dimension::ANGLE));
+                }
+                let trace = self.thing(scope, traces, of, "trace")?;
+                self.needs_target(name, &of.node)?;
+                let quantity = if closest { Quantity::ErrorClosest } else { Quantity::Error };
+                Ok((quantity(trace), Dimension::LENGTH))
+            }
+            "angle" => {
+                let index = self.angle(scope, name, args, None, name.at)?;
+                Ok((Quantity::Angle(index), Dimension::ANGLE))
             }
             "stress" => {
                 self.arguments(name, args, &[], 0)?;
@@ -153,7 +181,7 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Reports a driven joint that turns where one that slides is meant, or the other way round.
-    fn slides(&mut self, drive: &Ident, wanted: bool) -> Outcome<()> {
+    pub(super) fn slides(&mut self, drive: &Ident, wanted: bool) -> Outcome<()> {
         let name = &drive.node;
         if self.sliders.contains(name) == wanted {
             return Ok(());
@@ -186,32 +214,45 @@ impl<'a> Evaluator<'a> {
     }
 }
 
-/// `span(curl)`: the query of an `output`, which this version does not have.
+/// The name in `span(curl)` or `mean(curl)`: these exist for queries only, so it must be meant as an output.
 fn output_query(e: &Expr) -> Option<&Ident> {
     match &e.kind {
         ExprKind::Call { function, arguments } if matches!(function.node.as_str(), "span" | "mean") => {
             let [only] = arguments.as_slice() else { return None };
-            matches!(only.value.kind, ExprKind::Name(_)).then_some(function)
+            match &only.value.kind {
+                ExprKind::Name(path) if path.len() == 1 => path.first(),
+                _ => None,
+            }
         }
         _ => None,
     }
 }
 
 /// Recognises a query by the quantity it asks for.
-fn query(e: &Expr) -> Option<Query<'_>> {
+fn query<'a>(e: &'a Expr, is_output: &dyn Fn(&Ident) -> bool) -> Option<Query<'a>> {
     let ExprKind::Call { function, arguments } = &e.kind else { return None };
     let known =
         |n: &Ident| QUANTITIES.contains(&n.node.as_str()) || LATER_QUANTITIES.contains(&n.node.as_str());
     if known(function) {
-        return Some(Query { outer: None, inner: function, inner_arguments: arguments, time: None });
+        return Some(Query {
+            outer: None,
+            inner: function,
+            inner_arguments: arguments,
+            time: None,
+            output: false,
+        });
     }
     let (first, rest) = arguments.split_first()?;
+    let time = rest.first().map(|a| &a.value);
+    if let ExprKind::Name(path) = &first.value.kind {
+        let inner = path.first().filter(|n| path.len() == 1 && is_output(n))?;
+        return Some(Query { outer: Some(function), inner, inner_arguments: &[], time, output: true });
+    }
     let ExprKind::Call { function: inner, arguments: inner_arguments } = &first.value.kind else {
         return None;
     };
     if !known(inner) {
         return None;
     }
-    let time = rest.first().map(|a| &a.value);
-    Some(Query { outer: Some(function), inner, inner_arguments, time })
+    Some(Query { outer: Some(function), inner, inner_arguments, time, output: false })
 }

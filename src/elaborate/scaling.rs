@@ -46,6 +46,10 @@ fn names_process(e: &Expr) -> bool {
         ExprKind::Call { arguments, .. } => arguments.iter().any(|a| names_process(&a.value)),
         ExprKind::Tuple(items) => items.iter().any(names_process),
         // A range may end at a limit without being one.
-        ExprKind::Free { .. } | ExprKind::Number { .. } | ExprKind::Text(_) | ExprKind::Broken => false,
+        ExprKind::About { .. }
+        | ExprKind::Free { .. }
+        | ExprKind::Number { .. }
+        | ExprKind::Text(_)
+        | ExprKind::Broken => false,
     }
 }

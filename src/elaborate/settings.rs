@@ -113,6 +113,10 @@ fn shift(e: &mut Expr) {
             shift(lower);
             shift(upper);
         }
+        ExprKind::About { body, axis } => {
+            shift_at(&mut body.at);
+            shift(axis);
+        }
         ExprKind::Text(_) | ExprKind::Broken => {}
     }
 }

@@ -48,10 +48,16 @@ pub struct Sheet<'a> {
     pub material: Option<(&'a Ident, Origin)>,
     pub process: Option<(&'a Ident, Origin)>,
     pub height: Option<(&'a Expr, Origin)>,
+    pub model: Option<(&'a Ident, Origin)>,
     pub cycle: Option<(&'a Expr, Option<&'a Expr>, Origin)>,
     pub drives: Vec<DriveText<'a>>,
+    pub loads: Vec<(&'a ast::Load, Origin)>,
     pub rests: Vec<(&'a Ident, &'a Expr, Origin)>,
     pub traces: Vec<TraceText<'a>>,
+    /// Traced directions.
+    pub directions: Vec<TraceText<'a>>,
+    pub outputs: Vec<(&'a Ident, &'a Expr, Origin)>,
+    pub targets: Vec<(&'a Ident, &'a Expr, Origin)>,
     pub minimize: Option<(&'a [ast::Term], Origin)>,
     pub requires: Vec<RequireText<'a>>,
     pub exports: Vec<&'a Expr>,
@@ -145,6 +151,12 @@ impl<'a> Evaluator<'a> {
                     sheet.height = Some((height, at));
                 }
             }
+            StatementKind::Model(name) => {
+                let first = sheet.model.map(|m| m.1);
+                if self.once("model", at, first) {
+                    sheet.model = Some((name, at));
+                }
+            }
             StatementKind::Cycle { steps, over } => {
                 let first = sheet.cycle.map(|m| m.2);
                 if self.once("cycle", at, first) {
@@ -155,8 +167,20 @@ impl<'a> Evaluator<'a> {
                 let (motor, continuous) = (motor.as_ref(), *continuous);
                 sheet.drives.push(DriveText { joint, profile, motor, continuous, at });
             }
+            StatementKind::Load(load) => sheet.loads.push((load, at)),
             StatementKind::Rest { joint, value } => sheet.rests.push((joint, value, at)),
-            StatementKind::Trace { name, point, body } => {
+            StatementKind::Trace { name, direction: true, point, body } => {
+                if self.name_thing(scope, name, "direction") {
+                    sheet.directions.push(TraceText { name, point, body, at });
+                }
+            }
+            StatementKind::Output { name, value } => {
+                if self.name_thing(scope, name, "output") {
+                    sheet.outputs.push((name, value, at));
+                }
+            }
+            StatementKind::Target { trace, value } => sheet.targets.push((trace, value, at)),
+            StatementKind::Trace { name, point, body, .. } => {
                 if self.name_thing(scope, name, "trace") {
                     sheet.traces.push(TraceText { name, point, body, at });
                 }
@@ -181,8 +205,8 @@ impl<'a> Evaluator<'a> {
                     sheet.mirrors.push((mirror, at));
                 }
             }
-            StatementKind::Rod(_) => self.out.push(
-                Diagnostic::error(codes::MISPLACED, "a rod stands in a `flexure`, not in a mechanism", at)
+            StatementKind::Rod(_) | StatementKind::OwnBody { .. } => self.out.push(
+                Diagnostic::error(codes::MISPLACED, "this stands in a `flexure`, not in a mechanism", at)
                     .help("declare `flexure NAME replaces hinge { … }` and use it with `as NAME`"),
             ),
             StatementKind::Later { keyword } => {

@@ -18,7 +18,7 @@ const SQUARE: f64 = 1e-9;
 /// Farthest layer.
 const MAX_LAYER: f64 = 100.0;
 /// Most bodies, and most joints.
-const MAX_PARTS: usize = 256;
+pub(super) const MAX_PARTS: usize = 256;
 
 /// Bodies and joints with their names.
 #[derive(Default)]
@@ -113,6 +113,7 @@ impl<'a> Evaluator<'a> {
             ground: text.ground,
             skeleton,
             layer: layer.unwrap_or(0),
+            owner: None,
             origin: text.at,
         })
     }
@@ -195,7 +196,7 @@ impl<'a> Evaluator<'a> {
             }
         }
         if let Some(third) = text.bodies.get(2) {
-            ok = self.many(text, kind, third).and(ok);
+            ok = self.many(kind, third).and(ok);
         }
         let point = self.eval(&Env::fixed(scope), &text.point).and_then(|v| self.as_point(v, &text.point));
         let axes = self.axes(scope, text, kind, planar);
@@ -232,20 +233,13 @@ impl<'a> Evaluator<'a> {
         })
     }
 
-    /// Only a conventional hinge may join more than two bodies.
-    fn many(&mut self, text: &ast::Joint, kind: JointKind, third: &Ident) -> Outcome<()> {
+    /// Only a hinge may join more than two bodies.
+    fn many(&mut self, kind: JointKind, third: &Ident) -> Outcome<()> {
         if kind != JointKind::Hinge {
             let message = format!("a {} joint connects two bodies", kind.name());
             return self.fail(
                 Diagnostic::error(codes::JOINT_BODIES, message, third.at)
                     .help("write one joint for each pair of bodies"),
-            );
-        }
-        if text.template.is_some() {
-            let message = "a flexure between more than two bodies is not available yet";
-            return self.fail(
-                Diagnostic::error(codes::LATER_JOINT, message, third.at)
-                    .help("write one hinge for each pair of bodies, or leave out `as …`"),
             );
         }
         Ok(())
@@ -319,6 +313,17 @@ impl<'a> Evaluator<'a> {
     }
 
     pub(super) fn direction(&mut self, scope: usize, e: &'a Expr) -> Outcome<[f64; 3]> {
+        self.unit_direction(scope, e, "an axis", "write `axis z` or `axis (0, 1, 0.25)`")
+    }
+
+    /// A fixed direction of length one; `what` names what it is for ("an axis"), `how` how one is written.
+    pub(super) fn unit_direction(
+        &mut self,
+        scope: usize,
+        e: &'a Expr,
+        what: &str,
+        help: &str,
+    ) -> Outcome<[f64; 3]> {
         if let Some(axis) = named_axis(e) {
             return Ok(axis);
         }
@@ -328,22 +333,22 @@ impl<'a> Evaluator<'a> {
                 return self.fail(
                     Diagnostic::error(
                         codes::TYPE,
-                        format!("an axis is a direction, this is {}", other.a()),
+                        format!("{what} is a direction, this is {}", other.a()),
                         e.at,
                     )
-                    .help("write `axis z` or `axis (0, 1, 0.25)`"),
+                    .help(help),
                 );
             }
         };
         let mut d = [0.0; 3];
         for (slot, id) in d.iter_mut().zip(v) {
-            *slot = self.fixed(id, e.at, "an axis")?;
+            *slot = self.fixed(id, e.at, what)?;
         }
         let length = norm(d);
         if length < 1e-12 {
             return self.fail(Diagnostic::error(
                 codes::AXIS,
-                "an axis of length zero has no direction",
+                format!("{what} of length zero has no direction"),
                 e.at,
             ));
         }
@@ -418,8 +423,10 @@ impl<'a> Evaluator<'a> {
             for b in &joint.bodies {
                 let Some(body) = s.bodies.get_mut(*b) else { continue };
                 let known = body.skeleton.iter().any(|p| {
+                    // Points that only meet where the free variables start are different points.
+                    let fixed = !p.position.iter().chain(&joint.point).any(|id| self.exprs.is_free(*id));
                     p.position == joint.point
-                        || norm(minus(self.start_point(p.position), here)) < SAME_POINT_MM
+                        || fixed && norm(minus(self.start_point(p.position), here)) < SAME_POINT_MM
                 });
                 if !known {
                     body.skeleton.push(NamedPoint { name: name.clone(), position: joint.point });

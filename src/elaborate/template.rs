@@ -4,11 +4,11 @@ use super::codes;
 use super::dimension::Dimension;
 use super::eval::{Env, Evaluator, Failed, Outcome};
 use super::load::item_kind;
+use super::members::Members;
 use super::scope::{Local, LocalKind, State};
 use super::value::{ItemRef, Scalar, Value};
 use crate::diagnostic::{Diagnostic, Origin};
-use crate::ir::expr::{ExprId, Node};
-use crate::ir::{BodyId, ExprPoint, JointId, Rod, RodEnd, Section};
+use crate::ir::{Body, BodyId, JointId, JointKind, Rod, RodEnd, Section};
 use crate::syntax::ast::{self, Expr, ExprKind, Flexure, Ident, Item, StatementKind, TemplateUse};
 
 /// Most rods of a design.
@@ -20,6 +20,8 @@ pub struct Site<'s> {
     pub joint_name: &'s str,
     pub joint: JointId,
     pub bodies: &'s [BodyId],
+    /// The joint's.
+    pub layer: i32,
     /// The joint statement.
     pub statement: Origin,
     /// Kind written in the text.
@@ -31,7 +33,7 @@ pub struct Site<'s> {
 }
 
 impl<'a> Evaluator<'a> {
-    /// Elaborates one use of a template; returns its rods. What goes wrong inside the template also
+    /// Elaborates one use of a template; returns its rods, and adds its own bodies. What goes wrong inside the template also
     /// points at this use.
     pub(super) fn template(
         &mut self,
@@ -39,10 +41,10 @@ impl<'a> Evaluator<'a> {
         module: usize,
         text: &'a TemplateUse,
         site: &Site<'_>,
-        rods: &mut Vec<Rod>,
+        (rods, bodies): (&mut Vec<Rod>, &mut Vec<Body>),
     ) -> Outcome<Vec<usize>> {
         let before = self.out.len();
-        let made = self.instance(scope, module, text, site, rods);
+        let made = self.instance(scope, module, text, site, (rods, bodies));
         let (here, s) = (text.name.at, site.statement);
         let near = |at: Origin| at.file == s.file && s.start <= at.start && at.end <= s.end;
         for d in self.out.iter_mut().skip(before) {
@@ -62,10 +64,11 @@ impl<'a> Evaluator<'a> {
         module: usize,
         text: &'a TemplateUse,
         site: &Site<'_>,
-        rods: &mut Vec<Rod>,
+        (rods, bodies): (&mut Vec<Rod>, &mut Vec<Body>),
     ) -> Outcome<Vec<usize>> {
         let (owner, flexure) = self.flexure(scope, module, &text.name)?;
-        if site.kind != "hinge" && flexure.replaces.node == site.kind {
+        let made = [JointKind::Hinge, JointKind::Ball, JointKind::Universal, JointKind::Slider];
+        if !made.iter().any(|k| k.name() == site.kind) && flexure.replaces.node == site.kind {
             let message = format!("a flexure for a {} joint is not available yet", site.kind);
             return self.fail(
                 Diagnostic::error(codes::LATER_JOINT, message, text.name.at)
@@ -102,7 +105,7 @@ impl<'a> Evaluator<'a> {
                         Local { name: name.node.clone(), at: name.at, kind, state: State::Waiting },
                     );
                 }
-                StatementKind::Rod(_) => {}
+                StatementKind::Rod(_) | StatementKind::OwnBody { .. } => {}
                 StatementKind::Broken { .. } => ok = Err(Failed),
                 StatementKind::Later { keyword } => {
                     ok = self.later(codes::LATER_STATEMENT, &keyword.node, keyword.at);
@@ -110,17 +113,23 @@ impl<'a> Evaluator<'a> {
                 _ => {
                     ok = self.fail(
                         Diagnostic::error(codes::MISPLACED, "this does not belong in a flexure", s.at)
-                            .help("a flexure holds `param`, `let` and `rod`"),
+                            .help("a flexure holds `param`, `let`, `body` and `rod`"),
                     );
                 }
             }
         }
+        let (members, joined) = self.members(inner, flexure, text.name.at, site, bodies);
+        ok = ok.and(joined);
         for i in 0..self.scopes.get(inner).map_or(0, |s| s.locals.len()) {
-            let at = self.scopes.get(inner).and_then(|s| s.locals.get(i)).map(|l| l.at).unwrap_or_default();
+            let local = self.scopes.get(inner).and_then(|s| s.locals.get(i));
+            let Some(at) = local.filter(|l| !matches!(l.kind, LocalKind::Thing(_))).map(|l| l.at) else {
+                continue;
+            };
             if self.force(inner, i, at).is_err() {
                 ok = Err(Failed);
             }
         }
+        let Some(members) = members else { return Err(Failed) };
         let mut made = Vec::new();
         let mut names: Vec<&Ident> = Vec::new();
         for s in &flexure.statements {
@@ -145,7 +154,7 @@ impl<'a> Evaluator<'a> {
                     text.name.at,
                 ));
             }
-            match self.rod(inner, rod, s.at, site) {
+            match self.rod(inner, rod, s.at, site, &members) {
                 Ok(rod) => {
                     made.push(rods.len());
                     rods.push(rod);
@@ -293,11 +302,20 @@ impl<'a> Evaluator<'a> {
         ok
     }
 
-    fn rod(&mut self, scope: usize, rod: &'a ast::Rod, at: Origin, site: &Site<'_>) -> Outcome<Rod> {
+    fn rod(
+        &mut self,
+        scope: usize,
+        rod: &'a ast::Rod,
+        at: Origin,
+        site: &Site<'_>,
+        members: &Members,
+    ) -> Outcome<Rod> {
         let path = format!("{}.{}", site.joint_name, rod.name.node);
-        let from = self.rod_end(scope, &rod.from, site, &format!("{path}.from"));
-        let to = self.rod_end(scope, &rod.to, site, &format!("{path}.to"));
+        let second_axis = self.second_axis(rod, site);
+        let from = self.rod_end(scope, &rod.from, members, &format!("{path}.from"));
+        let to = self.rod_end(scope, &rod.to, members, &format!("{path}.to"));
         let section = self.section(scope, &rod.section, &path);
+        let section_to = self.section_to(scope, rod, &path);
         let (from, to) = (from?, to?);
         if from.body == to.body {
             return self.fail(Diagnostic::error(
@@ -306,31 +324,43 @@ impl<'a> Evaluator<'a> {
                 rod.name.at,
             ));
         }
-        Ok(Rod { path, joint: site.joint, from, to, section: section?, origin: at })
+        Ok(Rod {
+            path,
+            joint: site.joint,
+            from,
+            to,
+            second_axis: second_axis?,
+            section: section?,
+            section_to: section_to?,
+            origin: at,
+        })
+    }
+
+    /// Only a universal joint has two axes to choose from.
+    fn second_axis(&mut self, rod: &ast::Rod, site: &Site<'_>) -> Outcome<bool> {
+        match &rod.second_axis {
+            Some(said) if site.kind != JointKind::Universal.name() => self.fail(
+                Diagnostic::error(
+                    codes::MISPLACED,
+                    format!("a {} joint has no two axes", site.kind),
+                    said.at,
+                )
+                .help("leave out `axis …`: it chooses between the axes of a universal joint"),
+            ),
+            said => Ok(said.as_ref().is_some_and(|s| s.node)),
+        }
     }
 
     fn rod_end(
         &mut self,
         scope: usize,
         end: &'a ast::RodEnd,
-        site: &Site<'_>,
+        members: &Members,
         path: &str,
     ) -> Outcome<RodEnd> {
-        let letters: Vec<String> =
-            site.bodies.iter().zip('a'..='z').map(|(_, letter)| letter.to_string()).collect();
-        let body = match letters.iter().position(|l| *l == end.body.node).and_then(|i| site.bodies.get(i)) {
-            Some(b) => Ok(*b),
-            None => self.fail(
-                Diagnostic::error(
-                    codes::UNKNOWN_NAME,
-                    format!("the joint has no body `{}`", end.body.node),
-                    end.body.at,
-                )
-                .help(format!("its bodies are {} in the order written", letters.join(", "))),
-            ),
-        };
-        let position = self.cylindrical(scope, &end.position, &format!("{path}.at"));
-        let derivative = self.cylindrical(scope, &end.along, &format!("{path}.along"));
+        let body = self.member(&end.body, members);
+        let position = self.place(scope, &end.position, &format!("{path}.at"));
+        let derivative = self.place(scope, &end.along, &format!("{path}.along"));
         let (body, position, derivative) = (body?, position?, derivative?);
         if self.start_point(derivative).iter().all(|x| x.abs() < 1e-9) {
             return self.fail(
@@ -341,52 +371,8 @@ impl<'a> Evaluator<'a> {
         Ok(RodEnd { body, position, derivative })
     }
 
-    /// `cyl(r, φ[, z])` as Cartesian components on (e1, e2, e3).
-    fn cylindrical(&mut self, scope: usize, e: &'a Expr, path: &str) -> Outcome<ExprPoint> {
-        let ExprKind::Call { function, arguments } = &e.kind else {
-            if matches!(e.kind, ExprKind::Broken) {
-                return Err(Failed);
-            }
-            return self.fail(
-                Diagnostic::error(codes::TYPE, "a rod's end is given in cylinder coordinates", e.at)
-                    .help("write `cyl(r, φ)` or `cyl(r, φ, z)` in the frame of the end's body"),
-            );
-        };
-        match function.node.as_str() {
-            "cyl" => {}
-            "sph" => return self.later(codes::LATER_TERM, "sph", function.at),
-            other => {
-                let other = other.to_string();
-                return self.fail(
-                    Diagnostic::error(
-                        codes::UNKNOWN_FUNCTION,
-                        format!("`{other}` does not give the place of a rod's end"),
-                        function.at,
-                    )
-                    .help("write `cyl(r, φ)` or `cyl(r, φ, z)`"),
-                );
-            }
-        }
-        let slots = self.arguments(function, arguments, &["r", "φ", "z"], 2)?;
-        let mut ids: Vec<Outcome<ExprId>> = Vec::new();
-        for (slot, (name, dim, what)) in slots.into_iter().zip([
-            ("r", Dimension::LENGTH, "the radius of `cyl`"),
-            ("phi", Dimension::ANGLE, "the angle of `cyl`"),
-            ("z", Dimension::LENGTH, "the height of `cyl`"),
-        ]) {
-            ids.push(match slot {
-                Some(e) => self.eval_scalar(&Env::named(scope, format!("{path}.{name}")), e, dim, what),
-                None => self.constant(0.0, e.at),
-            });
-        }
-        let [r, phi, z]: [Outcome<ExprId>; 3] = ids.try_into().map_err(|_| Failed)?;
-        let (r, phi, z) = (r?, phi?, z?);
-        let [x, y] = self.polar_components(r, phi, e.at)?;
-        Ok([x, y, z])
-    }
-
     /// Sections are written in full widths and stored in semi-axes.
-    fn section(&mut self, scope: usize, e: &'a Expr, path: &str) -> Outcome<Section> {
+    pub(super) fn section(&mut self, scope: usize, e: &'a Expr, path: &str) -> Outcome<Section> {
         let ExprKind::Call { function, arguments } = &e.kind else {
             if matches!(e.kind, ExprKind::Broken) {
                 return Err(Failed);
@@ -412,7 +398,6 @@ impl<'a> Evaluator<'a> {
             }
         };
         let slots = self.arguments(function, arguments, widths, widths.len())?;
-        let half = self.constant(0.5, e.at)?;
         let mut semi = Vec::new();
         for (slot, name) in slots.into_iter().zip(widths) {
             let Some(width) = slot else { return Err(Failed) };
@@ -431,7 +416,7 @@ impl<'a> Evaluator<'a> {
                     .label(format!("this is {shown}")),
                 );
             }
-            semi.push(self.node(Node::Mul(id, half), e.at)?);
+            semi.push(self.half(id, e)?);
         }
         match semi.as_slice() {
             [a, b] if function.node.as_str() == "rect" => Ok(Section::Rect { a: *a, b: *b }),

@@ -14,6 +14,10 @@ pub struct MotionTable {
     pub bodies: Vec<String>,
     /// Whether the rows carry torque, energy and stress.
     pub has_forces: bool,
+    /// Whether loads act, which have a potential.
+    pub has_loads: bool,
+    /// Further columns with their values: name with unit, one value a state.
+    pub more: Vec<(String, Vec<f64>)>,
     /// The states in order.
     pub states: Vec<MotionState>,
 }
@@ -29,6 +33,8 @@ pub struct MotionState {
     pub drive_loads: Vec<f64>,
     /// Elastic energy, N·mm.
     pub energy_n_mm: f64,
+    /// Potential of the loads relative to the rest pose, N·mm.
+    pub load_potential_n_mm: f64,
     /// Largest von Mises stress over all rods, MPa.
     pub stress_max_mpa: f64,
     /// Translation t (mm) and rotation vector (rad), a body: x = t + R X with X in the rest pose.
@@ -73,7 +79,11 @@ pub fn columns(table: &MotionTable) -> Vec<String> {
             DriveUnit::Mm => format!("force.{drive}_n"),
         }));
         out.extend(["energy_n_mm", "stress_max_mpa"].map(String::from));
+        if table.has_loads {
+            out.push("load_potential_n_mm".into());
+        }
     }
+    out.extend(table.more.iter().map(|(name, _)| name.clone()));
     for body in &table.bodies {
         let parts = ["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"];
         out.extend(parts.map(|part| format!("pose.{body}.{part}")));
@@ -97,7 +107,11 @@ pub fn values(table: &MotionTable, step: usize) -> Vec<Option<f64>> {
     if table.has_forces {
         row.extend((0..table.drives.len()).map(|i| at(&state.drive_loads, i)));
         row.extend([state.energy_n_mm, state.stress_max_mpa]);
+        if table.has_loads {
+            row.push(state.load_potential_n_mm);
+        }
     }
+    row.extend(table.more.iter().map(|(_, values)| at(values, step)));
     for i in 0..table.bodies.len() {
         let (translation, rotation) = state.poses.get(i).copied().unwrap_or(([f64::NAN; 3], [f64::NAN; 3]));
         row.extend(translation.into_iter().chain(rotation));
@@ -136,11 +150,14 @@ mod tests {
             traces: vec!["tip".into()],
             bodies: vec!["coupler".into()],
             has_forces: true,
+            has_loads: false,
+            more: Vec::new(),
             states: vec![MotionState {
                 drives: vec![30_f64.to_radians()],
                 traces_mm: vec![[1.5, -0.0, 0.1]],
                 drive_loads: vec![-2.25],
                 energy_n_mm: 3.0,
+                load_potential_n_mm: -5.0,
                 stress_max_mpa: 1e-9,
                 poses: vec![([1.0, 2.0, 3.0], [0.1, 0.2, f64::NAN])],
             }],
@@ -171,6 +188,15 @@ mod tests {
         assert_eq!((names[1].as_str(), names[5].as_str()), ("drive.pull_mm", "force.pull_n"));
         assert_eq!(values(&sliding, 0)[1], Some(30_f64.to_radians()));
         assert_eq!(values(&sliding, 0)[5], Some(-2.25));
+    }
+
+    #[test]
+    fn further_columns_stand_before_the_poses() {
+        let more = vec![("output.curl_deg".to_string(), vec![12.5])];
+        let table = MotionTable { more, ..table() };
+        let names = columns(&table);
+        assert_eq!((names[8].as_str(), names[9].as_str()), ("output.curl_deg", "pose.coupler.tx_mm"));
+        assert_eq!((values(&table, 0)[8], values(&table, 0)[9]), (Some(12.5), Some(1.0)));
     }
 
     #[test]

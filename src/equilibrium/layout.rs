@@ -1,27 +1,20 @@
-//! The parts of the compliant model that do not depend on the design parameters: rest poses, end
-//! frames of the rods, constraints, drives, traces and their targets, all in rest world coordinates.
+//! What the rods of the compliant model are put into: rest poses, end frames of the rods, constraints, drives, traces
+//! and their targets, all in rest world coordinates; and how it moves with the free variables of the geometry.
 
-use crate::ir::{BodyId, Design};
+use super::change::{LayoutChange, layout_changes};
+use super::design_load::LayoutLoad;
+use super::frames::{RodEndFrame, end_frames};
+use super::target::{LayoutDirection, LayoutTrace};
+use crate::ir::{BodyId, Design, RodModel};
 use crate::kinematics::{Constraint, JointValue, Motion};
 use crate::math::Pose;
-use crate::rod::RodModel;
-use nalgebra::{Matrix3, Vector3};
-
-/// Orthonormal frame of a rod end in rest world coordinates: columns e1, e2, e3.
-#[derive(Clone, Debug)]
-pub struct RodEndFrame {
-    /// Body the end is clamped in.
-    pub body: BodyId,
-    /// The joint's physical point in the rest pose, mm.
-    pub origin: Vector3<f64>,
-    /// Columns e1, e2, e3.
-    pub axes: Matrix3<f64>,
-}
+use nalgebra::Vector3;
+use std::borrow::Cow;
 
 /// A rigid body of the compliant model.
 #[derive(Clone, Debug)]
 pub struct LayoutBody {
-    /// Centre of its increments: centroid of its joint points at rest, mm.
+    /// Centre of its increments: centroid of its joint points at rest, of a flexure's own body the joint's, mm.
     pub center: Vector3<f64>,
     /// First of its six unknowns, none for ground.
     pub first_dof: Option<usize>,
@@ -38,17 +31,6 @@ pub struct LayoutDrive {
     pub values: Vec<f64>,
 }
 
-/// A traced point.
-#[derive(Clone, Debug)]
-pub struct LayoutTrace {
-    /// Body that carries it.
-    pub body: BodyId,
-    /// Position in the rest pose, mm.
-    pub rest: Vector3<f64>,
-    /// Target per state 0..=N: the conventional mechanism's own path, mm.
-    pub target: Vec<Vector3<f64>>,
-}
-
 /// See the module.
 #[derive(Clone, Debug)]
 pub struct Layout {
@@ -60,21 +42,32 @@ pub struct Layout {
     pub constraints: Vec<Constraint>,
     /// Drives.
     pub drives: Vec<LayoutDrive>,
+    /// Loads of the design.
+    pub loads: Vec<LayoutLoad>,
     /// Traces.
     pub traces: Vec<LayoutTrace>,
+    /// Traced directions.
+    pub directions: Vec<LayoutDirection>,
     /// Whether states 0 and N are the same pose.
     pub closed: bool,
     /// Rest pose of each body relative to the drawing pose.
     pub rest_poses: Vec<Pose>,
+    /// Physical points of the joints in the drawing pose, mm.
+    pub joint_points: Vec<Vector3<f64>>,
+    /// How the conventional mechanism moves: the pose of every body in each state, relative to rest.
+    pub conventional: Vec<Vec<Pose>>,
     /// A typical length: lever of rotations in scaled systems, mm.
     pub length_mm: f64,
-    /// Rod theory; the plain one unless set otherwise.
+    /// Rod theory, as the design names it.
     pub rod_model: RodModel,
+    /// Its derivatives by every free variable that moves it (see [`Design::geometry_variables`]); none where the
+    /// conventional motion has none, at a dead point.
+    pub changes: Option<Vec<LayoutChange>>,
 }
 
 impl Layout {
     /// Moves the design's drawn geometry to the rest pose. `motion` is the conventional motion of
-    /// the same design, `p` the free variables (geometry outside templates does not depend on them).
+    /// the same design at the free variables `p`.
     pub fn new(design: &Design, motion: &Motion, p: &[f64]) -> Self {
         let values = design.exprs.evaluate(p);
         let rest = &motion.rest.poses;
@@ -91,7 +84,11 @@ impl Layout {
                 .filter(|(j, _)| j.bodies.contains(&i))
                 .map(|(_, p)| at_rest(i, p))
                 .collect();
-            let center = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
+            let center = match body.owner {
+                // Its rods lie round the joint.
+                Some(joint) => at_rest(i, &joint_points[joint]),
+                None => points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64,
+            };
             let first_dof = (!body.ground).then(|| {
                 next += 6;
                 next - 6
@@ -105,10 +102,9 @@ impl Layout {
                 continue;
             }
             for [a, b] in joint.pairs() {
-                let axis = rest[a].direction(&Vector3::from(joint.axis));
-                let second = joint.second_axis.map(|s| rest[b].direction(&Vector3::from(s)));
-                let point = at_rest(a, drawn);
-                constraints.extend(Constraint::of_joint(joint.kind, [a, b], point, &axis, second.as_ref()));
+                let (axis, second) = (Vector3::from(joint.axis), joint.second_axis.map(Vector3::from));
+                let made = Constraint::of_joint(joint.kind, [a, b], *drawn, &axis, second.as_ref());
+                constraints.extend(made.iter().map(|c| c.carried(rest)));
             }
         }
         for idle in motion.mobility.idle.iter().filter(|i| i.is_conventional(design)) {
@@ -121,57 +117,28 @@ impl Layout {
             .filter_map(|d| {
                 let joint = &design.joints[d.joint];
                 let pair = joint.pairs().next()?;
-                let axis = rest[pair[0]].direction(&Vector3::from(joint.axis));
-                let point = at_rest(pair[0], &joint_points[d.joint]);
+                let (axis, drawn) = (Vector3::from(joint.axis), joint_points[d.joint]);
                 let steps = design.cycle.steps;
                 Some(LayoutDrive {
-                    joint: JointValue::new(joint.kind, pair, point, &axis)?,
-                    rest: d.rest,
+                    joint: JointValue::new(joint.kind, pair, drawn, &axis)?.carried(&rest[pair[0]]),
+                    rest: d.free_rest.map_or(d.rest, |id| values.value(id)),
                     values: (0..=steps).map(|s| d.value(s as f64 / steps as f64)).collect(),
                 })
             })
             .collect();
 
+        let closed = design.is_closed();
         let traces = design
             .traces
             .iter()
             .enumerate()
-            .map(|(i, t)| LayoutTrace {
-                body: t.body,
-                rest: at_rest(t.body, &values.point(t.point)),
-                target: motion.states.iter().map(|s| s.traces_mm[i]).collect(),
+            .map(|(i, t)| {
+                LayoutTrace::new(design, motion, i, at_rest(t.body, &values.point(t.point)), closed)
             })
             .collect();
+        let directions = LayoutDirection::all(design, motion);
 
-        let rod_ends = design
-            .rods
-            .iter()
-            .map(|rod| {
-                let joint = &design.joints[rod.joint];
-                let drawn = joint_points[rod.joint];
-                [rod.from.body, rod.to.body].map(|body| {
-                    let origin = at_rest(body, &drawn);
-                    let e3 = rest[body].direction(&Vector3::from(joint.axis)).normalize();
-                    let aim = match joint.toward.iter().find(|(b, _)| *b == body) {
-                        Some((_, q)) => at_rest(body, &values.point(*q)),
-                        None => {
-                            let others: Vec<Vector3<f64>> = design
-                                .joints
-                                .iter()
-                                .enumerate()
-                                .filter(|(k, j)| *k != rod.joint && j.bodies.contains(&body))
-                                .map(|(k, _)| at_rest(body, &joint_points[k]))
-                                .collect();
-                            others.iter().sum::<Vector3<f64>>() / others.len().max(1) as f64
-                        }
-                    };
-                    let d = aim - origin;
-                    let e1 = (d - e3 * d.dot(&e3)).normalize();
-                    let e2 = e3.cross(&e1);
-                    RodEndFrame { body, origin, axes: Matrix3::from_columns(&[e1, e2, e3]) }
-                })
-            })
-            .collect();
+        let rod_ends = end_frames(design, motion, &values);
 
         // A typical arm: the mean distance of the joints from the centres of their bodies.
         let mut arms = (0.0, 0);
@@ -182,19 +149,26 @@ impl Layout {
         }
         let length_mm = (arms.0 / f64::from(arms.1.max(1))).max(1.0);
 
-        let closed = design.drives.iter().all(|d| d.is_closed());
+        let loads = LayoutLoad::of(design, motion, |p| values.point(p));
         let rest_poses = rest.clone();
-        Self {
+        let mut layout = Self {
             bodies,
             rod_ends,
             constraints,
             drives,
+            loads,
             traces,
+            directions,
             closed,
             rest_poses,
+            joint_points: joint_points.clone(),
+            conventional: motion.states.iter().map(|s| relative(&s.poses, rest)).collect(),
             length_mm,
-            rod_model: RodModel::default(),
-        }
+            rod_model: design.model,
+            changes: None,
+        };
+        layout.changes = layout_changes(&layout, design, motion, p);
+        layout
     }
 
     /// Number of link unknowns.
@@ -204,11 +178,36 @@ impl Layout {
 
     /// Number of states 0..=N.
     pub fn states(&self) -> usize {
-        self.drives.iter().map(|d| d.values.len()).max().unwrap_or(1)
+        let of_loads = self.loads.iter().map(|l| l.values.len());
+        self.drives.iter().map(|d| d.values.len()).chain(of_loads).max().unwrap_or(1)
     }
 
     /// Number of states that count in sums: a closed cycle's last state is its first.
     pub fn counted_states(&self) -> usize {
         if self.closed && self.states() > 1 { self.states() - 1 } else { self.states() }
     }
+}
+
+impl<'l> From<&'l Layout> for Cow<'l, Layout> {
+    fn from(layout: &'l Layout) -> Self {
+        Cow::Borrowed(layout)
+    }
+}
+
+impl From<Layout> for Cow<'_, Layout> {
+    fn from(layout: Layout) -> Self {
+        Cow::Owned(layout)
+    }
+}
+
+/// Poses relative to rest of poses that are relative to the drawing, as those of the rest pose are.
+fn relative(poses: &[Pose], rest: &[Pose]) -> Vec<Pose> {
+    let zero = Vector3::zeros();
+    let pair = |(pose, rest): (&Pose, &Pose)| {
+        let rotation = pose.rotation * rest.rotation.transpose();
+        // The drawing's origin lies at rest.point(0) in the rest pose.
+        let translation = pose.point(&zero) - rotation * rest.point(&zero);
+        Pose { rotation, translation, center: zero }
+    };
+    poses.iter().zip(rest).map(pair).collect()
 }

@@ -45,6 +45,26 @@ impl PointForce {
     }
 }
 
+/// How a [`PointForce`] changes with one design parameter, per unit of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PointForceChange {
+    /// Of the place in the rest pose, mm.
+    pub rest: Vector3<f64>,
+    /// Of the force, N.
+    pub force_n: Vector3<f64>,
+}
+
+impl PointForce {
+    /// Derivative of [`Self::gradient`] at a fixed pose when the force changes.
+    pub fn gradient_change(&self, pose: &Pose, change: &PointForceChange) -> SVector<f64, 6> {
+        let mut g = SVector::<f64, 6>::zeros();
+        g.fixed_rows_mut::<3>(0).copy_from(&-change.force_n);
+        let moved = pose.direction(&change.rest).cross(&self.force_n);
+        g.fixed_rows_mut::<3>(3).copy_from(&-(moved + pose.arm(&self.rest).cross(&change.force_n)));
+        g
+    }
+}
+
 impl Solver {
     /// The equilibrium under `loads` with the drives held at `target`, from an equilibrium without them; in
     /// parts where the whole load moves it too far at once.

@@ -5,6 +5,9 @@
 //! The rods are condensed one by one onto the links they join, so what is solved here is a small
 //! symmetric saddle-point system of link increments and multipliers.
 
+mod change;
+mod design_load;
+mod frames;
 mod layout;
 mod load;
 mod model;
@@ -12,10 +15,17 @@ mod newton;
 mod saddle;
 mod sensitivity;
 mod sweep;
+mod target;
+mod weight;
 
-pub use layout::{Layout, RodEndFrame};
-pub use load::PointForce;
+pub use change::{DirectionChange, DriveChange, EndFrameChange, LayoutChange, TraceChange};
+pub use design_load::{LayoutLoad, LayoutLoadKind};
+pub use frames::RodEndFrame;
+pub use layout::Layout;
+pub use load::{PointForce, PointForceChange};
 pub use model::{Model, ModelError, ModelRod, State};
 pub use newton::{Equilibrium, SolveError, Solver};
 pub use sensitivity::{Sensitivity, SensitivityWorkspace};
 pub use sweep::{Cycle, SweepError, sweep};
+pub use target::{LayoutDirection, LayoutTrace, angle_between};
+pub use weight::volume_and_center;

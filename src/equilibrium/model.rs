@@ -2,13 +2,14 @@
 //! derivatives of each rod's parameters by the design parameters.
 
 use super::layout::Layout;
-use crate::ir::{Design, Section};
+use crate::ir::{self, Design, Section};
 use crate::math::Pose;
 use crate::rod::{
     PARAMETERS, RestFrames, Rod, RodError, RodMaterial, RodModel, RodOptions, RodParameters, RodState,
     SectionShape,
 };
 use nalgebra::{DMatrix, Vector3};
+use std::borrow::Cow;
 
 /// A rod between two bodies.
 #[derive(Clone, Debug)]
@@ -17,17 +18,19 @@ pub struct ModelRod {
     pub rod: Rod,
     /// Bodies of its two ends.
     pub bodies: [usize; 2],
-    /// Its parameters by the design parameters, 17 × n.
+    /// Its parameters by the design parameters, 19 × n.
     pub dq_dp: DMatrix<f64>,
 }
 
 /// The model at given parameters.
 #[derive(Clone, Debug)]
 pub struct Model<'l> {
-    /// What does not depend on the parameters.
-    pub layout: &'l Layout,
+    /// What the rods are put into.
+    pub layout: Cow<'l, Layout>,
     /// One per flexure.
     pub rods: Vec<ModelRod>,
+    /// The design parameters.
+    pub p: Vec<f64>,
 }
 
 /// A flexure whose parameters make no rod.
@@ -50,16 +53,18 @@ pub struct State {
     pub lambda: Vec<f64>,
     /// Drive values relative to rest, unwrapped, rad or mm.
     pub drives: Vec<f64>,
+    /// Turn that each load works on, unwrapped, rad; zero for loads that are no moments.
+    pub turns: Vec<f64>,
 }
 
 /// How a section of the language is modelled: wires carry frames that need no joint axis.
-fn rod_options(section: &Section, model: RodModel) -> RodOptions {
-    let (section, frames) = match section {
+fn rod_options(rod: &ir::Rod, model: RodModel) -> RodOptions {
+    let (section, frames) = match rod.section {
         Section::Ellipse { .. } => (SectionShape::Ellipse, RestFrames::Axis),
         Section::Rect { .. } => (SectionShape::Rectangle, RestFrames::Axis),
         Section::Round { .. } => (SectionShape::Ellipse, RestFrames::Transport),
     };
-    RodOptions { section, frames, corrections: model.corrections() }
+    RodOptions { section, frames, corrections: model.corrections(), taper: rod.section_to.is_some() }
 }
 
 impl<'l> Model<'l> {
@@ -70,11 +75,12 @@ impl<'l> Model<'l> {
     /// The first flexure whose rest shape is degenerate.
     pub fn new(
         design: &Design,
-        layout: &'l Layout,
+        layout: impl Into<Cow<'l, Layout>>,
         p: &[f64],
         edges: usize,
         derivatives: bool,
     ) -> Result<Self, ModelError> {
+        let layout: Cow<'l, Layout> = layout.into();
         let values = design.exprs.evaluate(p);
         let material = RodMaterial { e_mpa: design.material.e_mpa, nu: design.material.nu };
         let mut rods = Vec::with_capacity(design.rods.len());
@@ -99,20 +105,33 @@ impl<'l> Model<'l> {
             for c in 0..3 {
                 q[12 + c] = ends[0].axes[(c, 2)];
             }
+            for change in layout.changes.iter().flatten() {
+                let mut column = dq_dp.column_mut(change.parameter);
+                for (k, (end, moved)) in
+                    [&rod.from, &rod.to].into_iter().zip(&change.rod_ends[index]).enumerate()
+                {
+                    let mut position = column.fixed_rows_mut::<3>(6 * k);
+                    position += moved.origin + moved.axes * values.point(end.position);
+                    let mut derivative = column.fixed_rows_mut::<3>(6 * k + 3);
+                    derivative += moved.axes * values.point(end.derivative);
+                }
+                column.fixed_rows_mut::<3>(12).copy_from(&change.rod_ends[index][0].axes.column(2));
+            }
             let [a, b] = rod.section.half_widths();
-            for (row, id) in [(15, a), (16, b)] {
+            let [a_to, b_to] = rod.section_to.as_ref().unwrap_or(&rod.section).half_widths();
+            for (row, id) in [(15, a), (16, b), (17, a_to), (18, b_to)] {
                 q[row] = values.value(id);
                 for (column, g) in values.gradient(id).iter().enumerate() {
                     dq_dp[(row, column)] = *g;
                 }
             }
-            let options = rod_options(&rod.section, layout.rod_model);
+            let options = rod_options(rod, layout.rod_model);
             let q = RodParameters::from_array(&q);
             let built = Rod::with_options(&q, material, edges, options, derivatives)
                 .map_err(|error| ModelError { rod: index, error })?;
             rods.push(ModelRod { rod: built, bodies: [rod.from.body, rod.to.body], dq_dp });
         }
-        Ok(Self { layout, rods })
+        Ok(Self { layout, rods, p: p.to_vec() })
     }
 
     /// The unstressed rest state.
@@ -122,6 +141,7 @@ impl<'l> Model<'l> {
             rods: self.rods.iter().map(|r| r.rod.rest_state()).collect(),
             lambda: vec![0.0; self.rows()],
             drives: vec![0.0; self.layout.drives.len()],
+            turns: vec![0.0; self.layout.loads.len()],
         }
     }
 

@@ -41,6 +41,8 @@ pub struct Equilibrium {
     pub stable: bool,
     /// Elastic energy, N·mm.
     pub energy_n_mm: f64,
+    /// Potential of the design's loads relative to the rest pose, N·mm.
+    pub load_potential_n_mm: f64,
     /// Strain measures of each rod at its stations.
     pub strains: Vec<Vec<StationStrain>>,
     /// Newton iterations taken.
@@ -73,6 +75,8 @@ pub struct Solver {
     pub(super) jacobian: Jacobian,
     /// Of the last solution asked for.
     pub(super) loads: Vec<PointForce>,
+    /// Sizes of the design's own loads, of the last solution asked for.
+    pub(super) sizes: Vec<f64>,
 }
 
 /// Sizes of what is not yet in balance.
@@ -121,10 +125,12 @@ impl Solver {
             rods_positive: false,
             jacobian: Jacobian::default(),
             loads: Vec::new(),
+            sizes: Vec::new(),
         }
     }
 
-    /// Solves for equilibrium at the drive values `target` (relative to rest, rad or mm), from `state`.
+    /// Solves for equilibrium at the controls `target` (drive values relative to rest, rad or mm, then sizes of the
+    /// design's loads, zero where not given), from `state`.
     /// On success the factors of the solved state are kept for tangents and sensitivities.
     ///
     /// # Errors
@@ -133,7 +139,7 @@ impl Solver {
         self.solve_loaded(model, state, target, &[])
     }
 
-    /// The same under dead forces. For large forces see [`Self::load`].
+    /// The same under dead forces besides the design's loads. For large forces see [`Self::load`].
     ///
     /// # Errors
     /// As [`Self::solve`].
@@ -146,6 +152,7 @@ impl Solver {
     ) -> Result<Equilibrium, SolveError> {
         self.loads.clear();
         self.loads.extend_from_slice(loads);
+        self.take_sizes(model, target);
         let mut state = state;
         for iteration in 0..ITERATIONS {
             let residual = self.assemble(model, &mut state, target);
@@ -156,7 +163,15 @@ impl Solver {
                 let stable = self.factor(model, &state, true);
                 let energy_n_mm = self.systems.iter().map(|s| s.energy()).sum();
                 let strains = model.rods.iter().zip(&self.systems).map(|(r, s)| s.strains(&r.rod)).collect();
-                return Ok(Equilibrium { state, stable, energy_n_mm, strains, iterations: iteration });
+                let load_potential_n_mm = model.load_potential_n_mm(&state, &self.sizes);
+                return Ok(Equilibrium {
+                    state,
+                    stable,
+                    energy_n_mm,
+                    load_potential_n_mm,
+                    strains,
+                    iterations: iteration,
+                });
             }
             self.factor(model, &state, false);
             let step = self.newton_step(model, &state, target);
@@ -171,7 +186,7 @@ impl Solver {
 
     /// Assembles all rods and measures the residual.
     fn assemble(&mut self, model: &Model, state: &mut State, target: &[f64]) -> Residual {
-        let layout = model.layout;
+        let layout = &model.layout;
         let mut gradient = DVector::zeros(layout.dofs());
         let (mut internal, mut largest, mut least_stiffness, mut floor) = (0.0f64, 0.0f64, f64::MAX, 0.0f64);
         for ((rod, system), rod_state) in model.rods.iter().zip(&mut self.systems).zip(&state.rods) {
@@ -193,6 +208,7 @@ impl Solver {
             let mut rows = gradient.fixed_rows_mut::<6>(first);
             rows += g;
         });
+        self.add_load_gradient(model, state, &mut gradient);
         let mut force_n = internal;
         for i in 0..gradient.len() {
             force_n = force_n.max((gradient[i] * self.scale[i]).abs());
@@ -218,6 +234,7 @@ impl Solver {
             let mut rows = gradient.fixed_rows_mut::<6>(first);
             rows += g;
         });
+        self.add_load_gradient(model, state, &mut gradient);
         for i in 0..n {
             rhs[i] = -gradient[i];
         }
@@ -268,6 +285,9 @@ impl Solver {
                 }
                 for (value, drive) in next.drives.iter_mut().zip(&model.layout.drives) {
                     *value = drive.joint.value(&next.poses, *value);
+                }
+                for (turn, load) in next.turns.iter_mut().zip(&model.layout.loads) {
+                    *turn = load.turn(&next.poses, *turn);
                 }
                 *state = next;
                 return Ok(());

@@ -81,6 +81,7 @@ impl Solver {
                 block += load.hessian(&state.poses[load.body]);
             }
         }
+        self.add_load_hessian(model, state, &mut k);
         let target: Vec<f64> = state.drives.clone();
         self.for_each_row(model, state, &target, |row, bodies, _, _, _, gradient| {
             for (half, body) in bodies.into_iter().enumerate() {
@@ -154,7 +155,8 @@ pub(super) fn gather(model: &Model, bodies: [usize; 2], v: &DVector<f64>) -> SVe
     out
 }
 
-fn scatter_matrix(
+/// Adds a 12 × 12 matrix of two bodies into the link block.
+pub(super) fn scatter_matrix(
     model: &Model,
     bodies: [usize; 2],
     h: &nalgebra::SMatrix<f64, 12, 12>,

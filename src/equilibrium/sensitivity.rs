@@ -1,34 +1,46 @@
 //! Derivatives of an equilibrium by the design parameters (Megaro et al. 2017, eqs. 18–19), in the
 //! forward form: one back-substitution per parameter with the factors of the accepted state.
 
-use super::load::PointForce;
-use super::model::Model;
+use super::change::LayoutChange;
+use super::load::{PointForce, PointForceChange};
+use super::model::{Model, State};
 use super::newton::{Equilibrium, SolveError, Solver};
-use crate::rod::{PARAMETERS, StrainJacobian};
+use super::saddle::scatter;
+use crate::rod::{CentrelineJacobian, PARAMETERS, StrainJacobian};
 use nalgebra::{DMatrix, DVector};
 
 /// First derivatives of one equilibrium by the n design parameters.
 #[derive(Clone, Debug)]
 pub struct Sensitivity {
-    /// Link increments (du, dφ per free body), dofs × n.
+    /// Link increments (du, dφ per free body), dofs × n: motions of all that a body carries. What moves within its body
+    /// (a traced point) adds that, turned by the pose.
     pub links: DMatrix<f64>,
     /// Multipliers, rows × n.
     pub lambda: DMatrix<f64>,
-    /// Per rod its own 29 directions (12 link increments, 17 parameters) by the n, 29 × n.
+    /// Per rod its own 31 directions (12 link increments, 19 parameters) by the n, 31 × n.
     pub directions: Vec<DMatrix<f64>>,
-    /// Per rod its strain measures with their derivatives by those 29 directions.
+    /// Per rod its strain measures with their derivatives by those 31 directions.
     pub strains: Vec<StrainJacobian>,
+    /// Per rod where it is, by the n; empty unless asked for ([`SensitivityWorkspace::with_centrelines`]).
+    pub centrelines: Vec<CentrelineJacobian>,
 }
 
 /// Reused by one thread.
 pub struct SensitivityWorkspace {
     solver: Solver,
+    centrelines: bool,
 }
 
 impl SensitivityWorkspace {
     /// For models of this size.
     pub fn new(model: &Model) -> Self {
-        Self { solver: Solver::new(model) }
+        Self { solver: Solver::new(model), centrelines: false }
+    }
+
+    /// The same, with the derivatives of the centrelines if `wanted`.
+    pub fn with_centrelines(mut self, wanted: bool) -> Self {
+        self.centrelines = wanted;
+        self
     }
 
     /// Derivatives at an accepted equilibrium with the drives held.
@@ -55,11 +67,30 @@ impl SensitivityWorkspace {
         target: &[f64],
         loads: &[PointForce],
     ) -> Result<Sensitivity, SolveError> {
+        self.at_moving(model, equilibrium, target, loads, &[])
+    }
+
+    /// The same under dead forces that change with the geometry: `load_changes` has, for each of the layout's
+    /// changes, one a load; or it is empty.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the equilibrium given is none, or the layout has no derivatives.
+    pub fn at_moving(
+        &mut self,
+        model: &Model,
+        equilibrium: &Equilibrium,
+        target: &[f64],
+        loads: &[PointForce],
+        load_changes: &[Vec<PointForceChange>],
+    ) -> Result<Sensitivity, SolveError> {
+        if model.layout.changes.is_none() {
+            return Err(SolveError::NoDerivatives);
+        }
         let solver = &mut self.solver;
         // Assembles and factors at the state itself; an accepted one takes no further iteration.
         solver.solve_loaded(model, equilibrium.state.clone(), target, loads)?;
         let (n, m) = (model.layout.dofs(), model.rows());
-        let parameters = model.rods.first().map_or(0, |r| r.dq_dp.ncols());
+        let parameters = model.p.len();
         let mut rhs = DMatrix::zeros(n + m, parameters);
         for (rod, system) in model.rods.iter().zip(&mut solver.systems) {
             let [a, b] = rod.bodies.map(|b| &equilibrium.state.poses[b]);
@@ -72,6 +103,19 @@ impl SensitivityWorkspace {
                 }
             }
         }
+        for (i, change) in model.layout.changes.iter().flatten().enumerate() {
+            let mut by = DVector::zeros(n + m);
+            geometry_column(model, &equilibrium.state, change, &mut by);
+            let changes = load_changes.get(i).map_or(&[][..], |c| c);
+            for (load, change) in loads.iter().zip(changes) {
+                if let Some(first) = model.layout.bodies[load.body].first_dof {
+                    let mut rows = by.fixed_rows_mut::<6>(first);
+                    rows += load.gradient_change(&equilibrium.state.poses[load.body], change);
+                }
+            }
+            let mut column = rhs.column_mut(change.parameter);
+            column -= by;
+        }
         for mut column in rhs.column_iter_mut() {
             let mut v: DVector<f64> = column.clone_owned();
             solver.solve_scaled(&mut v);
@@ -79,6 +123,7 @@ impl SensitivityWorkspace {
         }
         let mut directions = Vec::with_capacity(model.rods.len());
         let mut strains = Vec::with_capacity(model.rods.len());
+        let mut centrelines = Vec::new();
         for (rod, system) in model.rods.iter().zip(&solver.systems) {
             let mut own = DMatrix::zeros(12 + PARAMETERS, parameters);
             for (half, body) in rod.bodies.into_iter().enumerate() {
@@ -87,6 +132,11 @@ impl SensitivityWorkspace {
                 }
             }
             own.rows_mut(12, PARAMETERS).copy_from(&rod.dq_dp);
+            if self.centrelines {
+                let links = own.rows(0, 12).into_owned();
+                let jacobian = system.centreline_jacobian(&rod.rod, &links, &rod.dq_dp);
+                centrelines.push(jacobian.map_err(|_| SolveError::NoDerivatives)?);
+            }
             directions.push(own);
             strains.push(system.strain_jacobian(&rod.rod).map_err(|_| SolveError::NoDerivatives)?);
         }
@@ -95,6 +145,30 @@ impl SensitivityWorkspace {
             lambda: rhs.rows(n, m).into_owned(),
             directions,
             strains,
+            centrelines,
         })
+    }
+}
+
+/// Derivative of what the constraints and drives add to the gradient, and of their residuals, at fixed poses when the
+/// layout moves. Bodies keep their increments' centres: where forces balance it does not matter what they are.
+fn geometry_column(model: &Model, state: &State, change: &LayoutChange, out: &mut DVector<f64>) {
+    let n = model.layout.dofs();
+    let mut row = 0;
+    for (constraint, moved) in model.layout.constraints.iter().zip(&change.constraints) {
+        let lambda = &state.lambda[row..row + constraint.rows()];
+        let (residual, gradient) = constraint.reference_derivative(&state.poses, lambda, moved);
+        for r in 0..constraint.rows() {
+            out[n + row + r] += residual[r];
+        }
+        scatter(model, constraint.bodies(), &gradient, out);
+        row += constraint.rows();
+    }
+    for (drive, moved) in model.layout.drives.iter().zip(&change.drives) {
+        let (value, gradient) = drive.joint.reference_derivative(&state.poses, &moved.reference);
+        // The value counts from the rest pose: value − (α − rest) = 0.
+        out[n + row] += value + moved.rest;
+        scatter(model, drive.joint.bodies(), &(gradient * state.lambda[row]), out);
+        row += 1;
     }
 }

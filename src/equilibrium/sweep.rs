@@ -1,5 +1,6 @@
 //! Continuation over the cycle: from the unstressed rest pose to the nearest state, then forward to
-//! the last and backward to the first, each step predicted along the tangent by the drive values.
+//! the last and backward to the first, each step predicted along the tangent by drive values and loads. The loads grow
+//! from zero to those of that state before the drives move.
 
 use super::model::{Model, State};
 use super::newton::{Equilibrium, SolveError, Solver};
@@ -32,14 +33,19 @@ pub struct SweepError {
 /// [`SweepError`] at the first state that no step size reaches.
 pub fn sweep(model: &Model) -> Result<Cycle, SweepError> {
     let count = model.layout.states();
-    let target =
-        |s: usize| -> Vec<f64> { model.layout.drives.iter().map(|d| d.values[s] - d.rest).collect() };
-    let distance = |s: usize| target(s).iter().map(|v| v * v).sum::<f64>();
+    let drives = model.layout.drives.len();
+    let target = |s: usize| model.layout.controls(s);
+    // How far from rest: by the drives, of which a design under loads may have none.
+    let judged = if drives > 0 { 0..drives } else { 0..model.layout.loads.len() };
+    let distance = |s: usize| target(s)[judged.clone()].iter().map(|v| v * v).sum::<f64>();
     let nearest = (0..count).min_by(|a, b| distance(*a).total_cmp(&distance(*b))).unwrap_or(0);
 
     let mut solver = Solver::new(model);
     let start = Walker::at_rest(model, &mut solver);
     let mut first = start?;
+    let mut loaded = target(nearest);
+    loaded.iter_mut().take(drives).for_each(|d| *d = 0.0);
+    first.walk(model, &mut solver, nearest, &loaded)?;
     first.walk(model, &mut solver, nearest, &target(nearest))?;
     let middle = first.equilibrium.clone();
     let run = |states: &mut dyn Iterator<Item = usize>| -> Result<Vec<Equilibrium>, SweepError> {
@@ -60,24 +66,24 @@ pub fn sweep(model: &Model) -> Result<Cycle, SweepError> {
     Ok(Cycle { states })
 }
 
-/// A followed equilibrium and the drive values it belongs to.
+/// A followed equilibrium and the controls it belongs to.
 #[derive(Clone)]
 struct Walker {
     equilibrium: Equilibrium,
-    drives: Vec<f64>,
+    controls: Vec<f64>,
 }
 
 impl Walker {
     fn at_rest(model: &Model, solver: &mut Solver) -> Result<Self, SweepError> {
-        let drives = vec![0.0; model.layout.drives.len()];
+        let controls = vec![0.0; model.layout.drives.len() + model.layout.loads.len()];
         let equilibrium = solver
-            .solve(model, model.rest_state(), &drives)
-            .map_err(|error| Self::lost(model, &drives, 0, error))?;
-        Ok(Self { equilibrium, drives })
+            .solve(model, model.rest_state(), &controls)
+            .map_err(|error| Self::lost(model, &controls, 0, error))?;
+        Ok(Self { equilibrium, controls })
     }
 
-    fn lost(model: &Model, drives: &[f64], state: usize, error: SolveError) -> SweepError {
-        let last_drives = drives.iter().zip(&model.layout.drives).map(|(v, d)| v + d.rest).collect();
+    fn lost(model: &Model, controls: &[f64], state: usize, error: SolveError) -> SweepError {
+        let last_drives = controls.iter().zip(&model.layout.drives).map(|(v, d)| v + d.rest).collect();
         SweepError { state, last_drives, error }
     }
 
@@ -92,19 +98,19 @@ impl Walker {
         let mut part = 1.0;
         let mut fresh = true;
         loop {
-            let change: Vec<f64> = target.iter().zip(&self.drives).map(|(t, d)| t - d).collect();
+            let change: Vec<f64> = target.iter().zip(&self.controls).map(|(t, d)| t - d).collect();
             if change.iter().all(|c| c.abs() < 1e-15) {
                 return Ok(());
             }
             let next: Vec<f64> = if part >= 1.0 {
                 target.to_vec()
             } else {
-                self.drives.iter().zip(&change).map(|(d, c)| d + part * c).collect()
+                self.controls.iter().zip(&change).map(|(d, c)| d + part * c).collect()
             };
             match self.try_step(model, solver, &next, fresh) {
                 Ok(equilibrium) => {
                     self.equilibrium = equilibrium;
-                    self.drives = next;
+                    self.controls = next;
                     fresh = false;
                     if part >= 1.0 {
                         return Ok(());
@@ -116,7 +122,7 @@ impl Walker {
                     part *= 0.5;
                     fresh = true;
                     if part < LEAST_PART {
-                        return Err(Self::lost(model, &self.drives, state, error));
+                        return Err(Self::lost(model, &self.controls, state, error));
                     }
                 }
             }
@@ -134,11 +140,18 @@ impl Walker {
     ) -> Result<Equilibrium, SolveError> {
         let mut state: State = self.equilibrium.state.clone();
         if fresh {
-            state = solver.solve(model, state, &self.drives)?.state;
+            state = solver.solve(model, state, &self.controls)?.state;
         }
         let mut tangent = DVector::zeros(model.layout.dofs() + model.rows());
-        for (i, (to, from)) in next.iter().zip(&self.drives).enumerate() {
-            tangent += solver.drive_tangent(model, i) * (to - from);
+        let drives = model.layout.drives.len();
+        for (i, (to, from)) in
+            next.iter().zip(&self.controls).enumerate().filter(|(_, (to, from))| to != from)
+        {
+            let by_one = match i.checked_sub(drives) {
+                None => solver.drive_tangent(model, i),
+                Some(load) => solver.load_tangent(model, &state, load),
+            };
+            tangent += by_one * (to - from);
         }
         solver.advance(model, &mut state, &tangent, 1.0)?;
         solver.solve(model, state, next)

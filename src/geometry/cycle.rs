@@ -1,6 +1,7 @@
 //! Gaps over a cycle: bodies and bent flexures in every state, bodies against bodies, flexures against bodies
 //! (their own links too, beyond the roots) and against flexures of other joints.
 
+use super::carve::{CarvedLink, Carving};
 use super::distance::separation;
 use super::gap::{Member, NEAR_MM, ROOT_MM};
 use super::link::{BodyPlan, Role};
@@ -9,6 +10,10 @@ use super::slot::Slot;
 use crate::math::Pose;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// A carved link is looked at within this distance of a flexure, mm: beyond, it is nothing's nearest neighbour.
+const CARVED_MM: f64 = 5.0;
 
 /// One state of the cycle.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,8 +57,26 @@ pub fn cycle_gaps(
     states: &[MovedState],
     skipped: impl Fn(Member, Member) -> bool + Sync,
 ) -> CycleGaps {
-    let measured: Vec<(Option<LeastGap>, Vec<LeastGap>)> =
-        states.par_iter().enumerate().map(|(s, moved)| state_gaps(plans, s, moved, &skipped)).collect();
+    carved_cycle_gaps(plans, states, &Carving::default(), 0.0, skipped)
+}
+
+/// The same where links were carved: between such a link and the flexure it made way for the gap is measured on the
+/// carved solid, beyond twice the clearance from the attachment.
+pub fn carved_cycle_gaps(
+    plans: &[BodyPlan],
+    states: &[MovedState],
+    carving: &Carving,
+    clearance_mm: f64,
+    skipped: impl Fn(Member, Member) -> bool + Sync,
+) -> CycleGaps {
+    let links: BTreeMap<usize, CarvedLink<'_>> =
+        carving.links.iter().map(|(body, mesh)| (*body, CarvedLink::new(mesh))).collect();
+    let carved = Carved { carving, links, clearance_mm };
+    let measured: Vec<(Option<LeastGap>, Vec<LeastGap>)> = states
+        .par_iter()
+        .enumerate()
+        .map(|(s, moved)| state_gaps(plans, s, moved, &carved, &skipped))
+        .collect();
     let mut gaps = CycleGaps::default();
     for (least, overlaps) in measured {
         gaps.least.push(least);
@@ -67,6 +90,13 @@ pub fn cycle_gaps(
     }
     gaps.overlaps.sort_by_key(|o| (o.a, o.b));
     gaps
+}
+
+/// What was carved.
+struct Carved<'a> {
+    carving: &'a Carving,
+    links: BTreeMap<usize, CarvedLink<'a>>,
+    clearance_mm: f64,
 }
 
 /// The nearest pair so far, and all that overlap.
@@ -104,9 +134,14 @@ impl<F: Fn(Member, Member) -> bool> Search<'_, F> {
                 }
             }
         }
-        let Some(best) = best else { return };
+        if let Some(best) = best {
+            self.note(best);
+        }
+    }
+
+    fn note(&mut self, best: LeastGap) {
         if best.gap_mm < 0.0 {
-            match self.overlaps.iter_mut().find(|o| (o.a, o.b) == (a, b)) {
+            match self.overlaps.iter_mut().find(|o| (o.a, o.b) == (best.a, best.b)) {
                 Some(known) if best.gap_mm < known.gap_mm => *known = best,
                 Some(_) => {}
                 None => self.overlaps.push(best),
@@ -133,10 +168,16 @@ impl Piece {
     }
 }
 
+/// Eyes, or sleeve and bar, of one conventional joint: they move in each other by construction.
+pub(super) fn one_joint(a: Option<Role>, b: Option<Role>) -> bool {
+    matches!((a, b), (Some(Role::Eye(a)), Some(Role::Eye(b))) | (Some(Role::Guide(a)), Some(Role::Guide(b))) if a == b)
+}
+
 fn state_gaps(
     plans: &[BodyPlan],
     state: usize,
     moved: &MovedState,
+    carved: &Carved<'_>,
     skipped: &impl Fn(Member, Member) -> bool,
 ) -> (Option<LeastGap>, Vec<LeastGap>) {
     if moved.poses.len() != plans.len() {
@@ -150,12 +191,9 @@ fn state_gaps(
         .collect();
     for (i, first) in bodies.iter().enumerate() {
         for (j, second) in bodies.iter().enumerate().skip(i + 1) {
-            search.compare(
-                (Member::Body(i), first),
-                (Member::Body(j), second),
-                f64::INFINITY,
-                |p, q| matches!((p.role, q.role), (Some(Role::Eye(a)), Some(Role::Eye(b))) if a == b),
-            );
+            search.compare((Member::Body(i), first), (Member::Body(j), second), f64::INFINITY, |p, q| {
+                one_joint(p.role, q.role)
+            });
         }
     }
     let flexures: Vec<Vec<Piece>> =
@@ -171,6 +209,17 @@ fn state_gaps(
                 own.iter().any(|p| (q.slot.start - p).norm() <= depth || (q.slot.end - p).norm() <= depth)
             };
             let member = (Member::Body(i), body.as_slice());
+            if let Some(link) = carved.links.get(&i).filter(|_| carved.carving.made(i, f)) {
+                if !skipped(Member::Body(i), Member::Flexure(f)) {
+                    let bound = search.least.map_or(f64::INFINITY, |l| l.gap_mm).min(CARVED_MM);
+                    let pose = &moved.poses[i];
+                    if let Some((gap_mm, at)) = link.gap(flexure, i, pose, carved.clearance_mm, bound) {
+                        let (a, b, at) = (Member::Body(i), Member::Flexure(f), pose.point(&at));
+                        search.note(LeastGap { state, a, b, gap_mm, at });
+                    }
+                }
+                continue;
+            }
             search.compare(member, (Member::Flexure(f), pieces), f64::INFINITY, |_, q| within(q, NEAR_MM));
             if !own.is_empty() {
                 // Nearer to the root only being swallowed counts, and not by its own stub.

@@ -29,8 +29,23 @@ struct Vertex {
     on_a: Vector3<f64>,
 }
 
+/// Whether two slots are nearer to each other than a bound: most are told apart without the distance itself.
+pub fn nearer_than(a: &Slot, b: &Slot, bound_mm: f64) -> bool {
+    let (center, radius) = b.bounding_sphere();
+    let e = a.end - a.start;
+    let along = ((center - a.start).dot(&e) / e.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    let around = a.disc_radius_mm.hypot(a.half_height_mm) + a.round_mm;
+    let apart = (a.start + e * along - center).norm() - around - radius;
+    apart < bound_mm && until_apart(a, b, bound_mm).gap_mm < bound_mm
+}
+
 /// Signed distance of two slots.
 pub fn separation(a: &Slot, b: &Slot) -> Separation {
+    until_apart(a, b, f64::INFINITY)
+}
+
+/// Signed distance, or some gap of at least `enough_mm` as soon as the true one is known to be as large.
+fn until_apart(a: &Slot, b: &Slot, enough_mm: f64) -> Separation {
     let balls = a.round_mm + b.round_mm;
     let support = |d: &Vector3<f64>| {
         let on_a = a.support(&-d);
@@ -46,6 +61,10 @@ pub fn separation(a: &Slot, b: &Slot) -> Separation {
         }
         let next = support(&v);
         let advance = distance2 - v.dot(&next.w);
+        // Both cores lie on their sides of a plane this far apart.
+        if v.dot(&next.w) >= (enough_mm + balls) * distance2.sqrt() {
+            return Separation { gap_mm: v.norm() - balls, at: on_a - v / 2.0 };
+        }
         if advance <= RELATIVE_GAP * distance2 || simplex.iter().any(|s| s.w == next.w) {
             break;
         }
@@ -87,6 +106,13 @@ fn closest(s: &[Vertex]) -> [f64; 4] {
         [p, q, r, t] => tetrahedron([&p.w, &q.w, &r.w, &t.w]),
         _ => [1.0, 0.0, 0.0, 0.0],
     }
+}
+
+/// The point of a triangle nearest to a point.
+pub(super) fn point_triangle(p: &Vector3<f64>, corners: &[Vector3<f64>; 3]) -> Vector3<f64> {
+    let [a, b, c] = corners.map(|q| q - p);
+    let [u, v, w] = triangle(&a, &b, &c);
+    corners[0] * u + corners[1] * v + corners[2] * w
 }
 
 fn segment(p: &Vector3<f64>, q: &Vector3<f64>) -> [f64; 2] {

@@ -1,5 +1,6 @@
 //! What grows together or comes too near in the rest pose, where it would be printed as one.
 
+use super::carve::Carving;
 use super::distance::separation;
 use super::link::{BodyPlan, Role};
 use super::parts::PartsInput;
@@ -37,7 +38,13 @@ pub struct Fusion {
 
 /// The worst overlap of each pair in the rest pose. Flexures of one joint are not compared with each
 /// other: their sub-layers keep them apart by the design's own gap.
-pub fn fusions(input: &PartsInput, plans: &[BodyPlan], groups: &[Vec<usize>]) -> Vec<Fusion> {
+/// A link that was carved for a flexure keeps clear of it by construction.
+pub fn fusions(
+    input: &PartsInput,
+    plans: &[BodyPlan],
+    groups: &[Vec<usize>],
+    carving: &Carving,
+) -> Vec<Fusion> {
     let group_of = |body: usize| groups.iter().position(|g| g.contains(&body));
     let mut found = Vec::new();
     for (i, plan_i) in plans.iter().enumerate() {
@@ -63,7 +70,7 @@ pub fn fusions(input: &PartsInput, plans: &[BodyPlan], groups: &[Vec<usize>]) ->
             whole.iter().filter(|s| away(&s.start) && away(&s.end)).copied().collect()
         };
         let (free, inner) = (beyond(ROOT_MM), beyond(NEAR_MM));
-        for (i, plan) in plans.iter().enumerate() {
+        for (i, plan) in plans.iter().enumerate().filter(|(i, _)| !carving.made(*i, f)) {
             let attached = i == flexure.bodies.0 || i == flexure.bodies.1;
             let own_stub = |role: &Role| attached && *role == Role::Stub(f);
             let slots: Vec<Slot> = plan.slots.iter().filter(|(r, _)| !own_stub(r)).map(|(_, s)| *s).collect();

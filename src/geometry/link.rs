@@ -5,44 +5,51 @@
 //! its neck, so that no two faces coincide and the boolean kernel meets only clear crossings. What
 //! is left (bars side by side under one boss) is kept apart by a small spread of heights.
 
-use super::distance::separation;
+use super::anchor::{Anchor, FlexureEnd, Follow, SizeBy};
+use super::distance::nearer_than;
 use super::mesh::Mesh;
-use super::parts::{Bore, Eye, FLOOR_MM, GeometryError, PartsInput};
+use super::parts::{Bore, Eye, FLOOR_MM, FlexureSolid, GeometryError, PartsInput};
+use super::riser::Near;
 use super::skeleton::connect;
 use super::slot::{Facets, Slot};
 use nalgebra::Vector3;
+use std::cell::OnceCell;
 
 /// Half width of a bar as a part of the layer's height.
-const BAR_PER_HEIGHT: f64 = 0.35;
+pub const BAR_PER_HEIGHT: f64 = 0.35;
 /// Radius of a boss or plain eye beyond the bar's half width, mm.
-const BOSS_EXTRA_MM: f64 = 0.4;
+pub(super) const BOSS_EXTRA_MM: f64 = 0.4;
 /// How far the top of a boss stays below its layer's face, mm.
-const BOSS_BELOW_MM: f64 = 0.02;
+pub(super) const BOSS_BELOW_MM: f64 = 0.02;
 /// How far the top of a bar stays below its layer's face, mm.
-const BAR_BELOW_MM: f64 = 0.25;
+pub(super) const BAR_BELOW_MM: f64 = 0.25;
 /// Largest spread of heights and widths that keeps like faces apart, mm.
-const SPREAD_MM: f64 = 0.08;
+pub(super) const SPREAD_MM: f64 = 0.08;
 /// Half width of a stub, mm; more where a thick flexure needs it.
-const STUB_RADIUS_MM: f64 = 2.2;
+pub(super) const STUB_RADIUS_MM: f64 = 2.2;
 /// Length of a stub in front of its boss, mm.
-const STUB_FREE_MM: f64 = 3.0;
+pub(super) const STUB_FREE_MM: f64 = 3.0;
 /// How far a stub reaches over the attachment plane, mm: its round nose then holds the whole
 /// thickness of a flexure at that plane on average.
-const STUB_OVER_MM: f64 = 0.05;
+pub(super) const STUB_OVER_MM: f64 = 0.05;
+/// Least half height of a stub and of a neck, mm.
+pub(super) const LEAST_HALF_MM: f64 = 0.1;
 /// How far a stub stays below the rim of a flexure that fills its sub-layer, mm.
-const STUB_BELOW_MM: f64 = 0.06;
+pub(super) const STUB_BELOW_MM: f64 = 0.06;
 /// Rounding of edges, mm.
-const ROUND_MM: f64 = 0.8;
+pub(super) const ROUND_MM: f64 = 0.8;
 /// Rounding of a stub's edges, mm: small, so that the flexure's clamp is as wide as the flexure.
-const STUB_ROUND_MM: f64 = 0.5;
+pub(super) const STUB_ROUND_MM: f64 = 0.5;
 /// Wall round a bore, mm; the process's least wall if that is more.
 const BORE_WALL_MM: f64 = 2.0;
 /// Kept beyond the clearance, so that rounding cannot eat it, mm.
-const CLEAR_MM: f64 = 0.01;
+pub(super) const CLEAR_MM: f64 = 0.01;
 /// Next to its attachment a flexure may be nearer to its own link's bars than the clearance, mm.
 const OWN_ROOT_MM: f64 = 2.0;
+/// Sine of the angle by which axes and ends may differ in a body of layers: rounding of the rest pose.
+const FLAT: f64 = 1e-6;
 /// Points nearer than this in plan are one node, mm.
-const SAME_NODE_MM: f64 = 1.0;
+pub(super) const SAME_NODE_MM: f64 = 1.0;
 
 /// What a slot of a body is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,6 +64,8 @@ pub enum Role {
     Eye(usize),
     /// Joins layers.
     Riser,
+    /// Sleeve or bar of the conventional slider with this index.
+    Guide(usize),
 }
 
 /// A cylinder to be taken out of a body.
@@ -77,6 +86,8 @@ pub struct BoreCut {
 pub struct BodyPlan {
     /// What is united.
     pub slots: Vec<(Role, Slot)>,
+    /// What each slot follows when the flexures change.
+    pub follows: Vec<Follow>,
     /// What is then cut out.
     pub bores: Vec<BoreCut>,
     /// What the maker should know.
@@ -115,35 +126,43 @@ impl BodyPlan {
 }
 
 /// Spread in 0..1 by the golden ratio: any two small indices get clearly different values.
-fn spread(i: usize) -> f64 {
+pub(super) fn spread(i: usize) -> f64 {
     (i as f64 * 0.618_033_988_749_894_9 + 0.137).fract()
 }
 
-/// A place in plan where something of the body ends.
-struct Node {
-    /// At the body's own level.
-    at: Vector3<f64>,
+/// A place where something of the body ends.
+pub(super) struct Node {
+    /// At the body's own level, if it has one.
+    pub(super) at: Vector3<f64>,
     /// Eye in the body's own layer, if any: bars then end in necks at its slot's height.
-    own_eye: Option<EyeShape>,
+    pub(super) own_eye: Option<EyeShape>,
+    /// What it follows.
+    pub(super) anchor: Anchor,
 }
 
 /// Measures of an eye.
 #[derive(Clone, Copy)]
-struct EyeShape {
-    center: Vector3<f64>,
-    radius: f64,
-    half_height: f64,
+pub(super) struct EyeShape {
+    pub(super) center: Vector3<f64>,
+    pub(super) radius: f64,
+    pub(super) half_height: f64,
     /// Radius to be kept free for the other bodies at this joint.
-    keep_out: f64,
+    pub(super) keep_out: f64,
 }
 
 /// Shared state while one body is planned.
-struct Builder<'a> {
-    input: &'a PartsInput,
-    plan: BodyPlan,
-    nodes: Vec<Node>,
-    level: f64,
-    index: usize,
+pub(super) struct Builder<'a> {
+    pub(super) input: &'a PartsInput,
+    pub(super) plan: BodyPlan,
+    pub(super) nodes: Vec<Node>,
+    /// Axis of the body's own layers; of no meaning for a body in space.
+    pub(super) axis: Vector3<f64>,
+    pub(super) level: f64,
+    pub(super) index: usize,
+    /// What moves beside the body, seen from it; found when first asked for.
+    pub(super) moving: OnceCell<Vec<Near>>,
+    /// Places of eyes in other layers that cannot be reached straight.
+    pub(super) risen: Vec<Vector3<f64>>,
 }
 
 /// Plans one body.
@@ -151,7 +170,20 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
     let Some(body) = input.bodies.get(index) else {
         return Err(GeometryError::Input(format!("there is no body {index}")));
     };
-    let mut b = Builder { input, plan: BodyPlan::default(), nodes: Vec::new(), level: body.level_mm, index };
+    let mut b = Builder {
+        input,
+        plan: BodyPlan::default(),
+        moving: OnceCell::new(),
+        risen: Vec::new(),
+        nodes: Vec::new(),
+        axis: body.axis.unwrap_or_else(Vector3::z),
+        level: body.level_mm,
+        index,
+    };
+    if body.axis.is_none_or(|axis| !lies_flat(input, index, &axis)) {
+        b.plan_in_space(body)?;
+        return Ok(b.plan);
+    }
     for eye in &body.eyes {
         b.add_eye(eye, &body.name);
     }
@@ -162,9 +194,14 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
             }
         }
     }
-    for p in &body.skeleton {
-        b.node(*p, None);
+    for guide in &body.guides {
+        b.add_guide(guide, false)?;
     }
+    let guided = |p: &Vector3<f64>| body.guides.iter().any(|g| (g.point - p).norm() < SAME_NODE_MM);
+    for p in body.skeleton.iter().filter(|p| !guided(p) && !b.is_risen(p)).copied().collect::<Vec<_>>() {
+        b.node(p, None, Anchor::Fixed);
+    }
+    b.rise_beside();
     if b.nodes.is_empty() {
         return Err(GeometryError::NoSkeleton(body.name.clone()));
     }
@@ -172,34 +209,55 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
     Ok(b.plan)
 }
 
+/// Whether everything that ends in a body can be made in layers along an axis: eyes along it, leaves across it, no
+/// rod that leaves along it.
+fn lies_flat(input: &PartsInput, index: usize, axis: &Vector3<f64>) -> bool {
+    let eyes = input.bodies[index].eyes.iter().all(|e| e.axis.cross(axis).norm() < FLAT);
+    let flat = |f: &FlexureSolid, at_end: bool| {
+        let wide = if at_end { f.m2.last() } else { f.m2.first() };
+        let (a, b) = f.end_axes(at_end);
+        let upright = a == b || wide.is_some_and(|m| m.cross(axis).norm() < FLAT);
+        let off = (f.end_point(at_end) - f.joint_point).dot(axis).abs();
+        upright && f.outward(at_end).dot(axis).abs() < FLAT && off + b <= input.height_mm / 2.0 + FLAT
+    };
+    let ends = |f: &FlexureSolid, body: usize, at_end: bool| body != index || flat(f, at_end);
+    eyes && input.flexures.iter().all(|f| ends(f, f.bodies.0, false) && ends(f, f.bodies.1, true))
+}
+
 impl Builder<'_> {
-    fn axis(&self) -> Vector3<f64> {
-        self.input.axis
+    pub(super) fn axis(&self) -> Vector3<f64> {
+        self.axis
     }
 
-    fn half(&self) -> f64 {
+    pub(super) fn half(&self) -> f64 {
         self.input.height_mm / 2.0
     }
 
-    fn bar_radius(&self) -> f64 {
+    pub(super) fn bar_radius(&self) -> f64 {
         self.input.height_mm * BAR_PER_HEIGHT
     }
 
-    fn boss_radius(&self) -> f64 {
+    pub(super) fn boss_radius(&self) -> f64 {
         self.bar_radius() + BOSS_EXTRA_MM
     }
 
     /// A point moved along the axis to a level.
-    fn at_level(&self, p: &Vector3<f64>, level: f64) -> Vector3<f64> {
+    pub(super) fn at_level(&self, p: &Vector3<f64>, level: f64) -> Vector3<f64> {
         p + self.axis() * (level - p.dot(&self.axis()))
     }
 
-    fn push(&mut self, role: Role, slot: Slot) {
+    /// Adds a slot that is where the conventional mechanism puts it.
+    pub(super) fn push(&mut self, role: Role, slot: Slot) {
+        self.push_following(role, slot, Follow::default());
+    }
+
+    pub(super) fn push_following(&mut self, role: Role, slot: Slot, follow: Follow) {
         self.plan.slots.push((role, slot));
+        self.plan.follows.push(follow);
     }
 
     /// The node at a place in plan, made if there is none.
-    fn node(&mut self, p: Vector3<f64>, own_eye: Option<EyeShape>) -> usize {
+    pub(super) fn node(&mut self, p: Vector3<f64>, own_eye: Option<EyeShape>, anchor: Anchor) -> usize {
         let at = self.at_level(&p, self.level);
         if let Some(i) = self.nodes.iter().position(|n| (n.at - at).norm() < SAME_NODE_MM) {
             if self.nodes[i].own_eye.is_none() {
@@ -207,12 +265,12 @@ impl Builder<'_> {
             }
             return i;
         }
-        self.nodes.push(Node { at, own_eye });
+        self.nodes.push(Node { at, own_eye, anchor });
         self.nodes.len() - 1
     }
 
     /// Measures of an eye: its share of the joint's layer, and the radius all of them need.
-    fn eye_shape(&self, eye: &Eye) -> EyeShape {
+    pub(super) fn eye_shape(&self, eye: &Eye) -> EyeShape {
         let (k, n) = (eye.slot.0 as f64, eye.slot.1 as f64);
         let c = self.input.clearance_mm;
         let share = (self.input.height_mm - (n - 1.0) * c) / n;
@@ -222,7 +280,7 @@ impl Builder<'_> {
             |bore: &Bore| self.boss_radius().max(bore.diameter_mm().map_or(0.0, |d| d / 2.0 + wall));
         let others = self.input.bodies.iter().flat_map(|b| &b.eyes).filter(|e| e.joint == eye.joint);
         EyeShape {
-            center: eye.point + self.axis() * middle,
+            center: eye.point + eye.axis * middle,
             radius: radius_of(&eye.bore),
             half_height: share / 2.0,
             keep_out: others.map(|e| radius_of(&e.bore)).fold(0.0, f64::max) + c + CLEAR_MM,
@@ -236,16 +294,25 @@ impl Builder<'_> {
         if (eye.point.dot(&self.axis()) - self.level).abs() < 0.5 * self.input.height_mm {
             let slot = Slot::bar(center, center, self.axis(), shape.radius, half, ROUND_MM);
             self.push(Role::Eye(eye.joint), slot);
-            self.node(eye.point, Some(shape));
+            self.node(eye.point, Some(shape), Anchor::Fixed);
         } else {
-            self.column(Role::Eye(eye.joint), &eye.point, (level - half, level + half), shape.radius);
-            self.node(eye.point, None);
+            let span = (level - half, level + half);
+            let straight = self.column_slot(&eye.point, span, shape.radius);
+            if self.meets_moving(&straight) {
+                // Bars and stubs come first: the way round leads to them.
+                self.risen.push(eye.point);
+                let slot = Slot::bar(center, center, self.axis(), shape.radius, half, ROUND_MM);
+                self.push(Role::Eye(eye.joint), slot);
+            } else {
+                self.column(Role::Eye(eye.joint), &eye.point, span, shape.radius, &Anchor::Fixed);
+                self.node(eye.point, None, Anchor::Fixed);
+            }
         }
         self.bore(eye, &shape, name);
     }
 
-    fn bore(&mut self, eye: &Eye, shape: &EyeShape, name: &str) {
-        let axis = self.axis();
+    pub(super) fn bore(&mut self, eye: &Eye, shape: &EyeShape, name: &str) {
+        let axis = eye.axis;
         let c = self.input.clearance_mm;
         match eye.bore {
             Bore::Solid => self.plan.notes.push(format!(
@@ -269,8 +336,13 @@ impl Builder<'_> {
                 }
             }
             Bore::Through { diameter_mm } => {
-                let joint_level = eye.point.dot(&axis);
-                let reach = (joint_level - self.level).abs() + self.input.height_mm;
+                // A body in space is passed within the joint's own stack.
+                let layers = if self.input.bodies[self.index].axis.is_some() {
+                    (eye.point.dot(&axis) - self.level).abs()
+                } else {
+                    0.0
+                };
+                let reach = layers + self.input.height_mm;
                 let (start, end) = (eye.point - axis * reach, eye.point + axis * reach);
                 self.plan.bores.push(BoreCut { joint: eye.joint, start, end, diameter_mm });
             }
@@ -296,6 +368,11 @@ impl Builder<'_> {
         let middle = p.dot(&axis);
         let level = flexure.joint_point.dot(&axis);
         let (mut low, mut high) = (middle - b - wall, middle + b + wall);
+        // Which of the two follow the flexure, and which are faces of the layer.
+        let mut follows = [
+            low >= level - self.half() || level - self.half() >= middle - b,
+            high <= level + self.half() || level + self.half() <= middle + b,
+        ];
         low = low.max(level - self.half()).min(middle - b);
         high = high.min(level + self.half()).max(middle + b);
         for other in self.input.flexures.iter().filter(|f| f.joint == flexure.joint && f.path != flexure.path)
@@ -303,8 +380,10 @@ impl Builder<'_> {
             let z = other.centreline.first().map_or(middle, |q| q.dot(&axis));
             if z < middle - 1e-6 {
                 low = middle - b;
+                follows[0] = true;
             } else if z > middle + 1e-6 {
                 high = middle + b;
+                follows[1] = true;
             }
         }
         let half_height =
@@ -312,22 +391,63 @@ impl Builder<'_> {
         let center = self.at_level(&p, (low + high) / 2.0);
         let nose = center + flat * (radius - STUB_OVER_MM);
         let root = center + flat * (STUB_FREE_MM + self.boss_radius());
-        self.push(
+        // The height of each face by the flexure, then of middle and half of the stub.
+        let [lower, upper] = follows.map(|f| if f { 1.0 } else { 0.0 });
+        let centred = SizeBy { level: 0.5 * (upper + lower), a: 0.0, b: 0.5 * (upper - lower) };
+        let mut half_by = SizeBy { level: 0.5 * (upper - lower), a: 0.0, b: 0.5 * (upper + lower) };
+        if half_height <= LEAST_HALF_MM {
+            half_by = SizeBy::default();
+        }
+        let radius_by = SizeBy { a: f64::from(u8::from(a + wall > STUB_RADIUS_MM)), ..SizeBy::default() };
+        let end = FlexureEnd { flexure: index, at_end, axis };
+        let along =
+            |along_mm: f64, along: SizeBy, level: SizeBy| Anchor::Stub { end, along_mm, along, level };
+        let reach = STUB_FREE_MM + self.boss_radius();
+        let nose_anchor = along(radius - STUB_OVER_MM, radius_by, centred);
+        self.push_following(
             Role::Stub(index),
-            Slot::bar(nose, root, axis, radius, half_height.max(0.1), STUB_ROUND_MM),
+            Slot::bar(nose, root, axis, radius, half_height.max(LEAST_HALF_MM), STUB_ROUND_MM),
+            Follow {
+                ends: [nose_anchor, along(reach, SizeBy::default(), centred)],
+                sized_by: Some(end),
+                radius: radius_by,
+                half_height: half_by,
+            },
         );
+        let anchor = along(reach, SizeBy::default(), SizeBy::default());
         if (level - self.level).abs() < 0.5 * self.input.height_mm {
-            self.boss(self.at_level(&root, self.level), self.boss_radius());
+            self.boss(self.at_level(&root, self.level), self.boss_radius(), &anchor);
         } else {
             let half = self.half() - BOSS_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len());
-            self.column(Role::Riser, &root, (level - half, level + half), self.boss_radius());
+            let span = (level - half, level + half);
+            let straight = self.column_slot(&root, span, self.boss_radius());
+            let on_level = self.at_level(&root, level);
+            let arm = |foot: &Vector3<f64>| {
+                Slot::bar(on_level, *foot, axis, self.bar_radius(), half - BAR_BELOW_MM, ROUND_MM)
+            };
+            let foot = if self.meets_moving(&straight) {
+                self.foot(&on_level, span, self.bar_radius(), arm)
+            } else {
+                None
+            };
+            if let Some(foot) = foot {
+                // It stays where it is beside the stub.
+                let (arm, radius) = (arm(&foot), self.bar_radius());
+                let boss = Slot::bar(on_level, on_level, axis, self.boss_radius(), half, ROUND_MM);
+                self.push_following(Role::Boss, boss, Follow::point(&anchor));
+                self.push_following(Role::Bar, arm, Follow::point(&anchor));
+                self.column(Role::Riser, &foot, span, radius + 0.5 * BOSS_EXTRA_MM, &anchor);
+                self.node(foot, None, anchor);
+                return Ok(());
+            }
+            self.column(Role::Riser, &root, span, self.boss_radius(), &anchor);
         }
-        self.node(root, None);
+        self.node(root, None, anchor);
         Ok(())
     }
 
     /// A full-height disc, unless something as wide stands there already.
-    fn boss(&mut self, at: Vector3<f64>, radius: f64) {
+    pub(super) fn boss(&mut self, at: Vector3<f64>, radius: f64, anchor: &Anchor) {
         let half = self.half() - BOSS_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len());
         let axis = self.axis();
         let taken = self.plan.slots.iter().any(|(role, s)| {
@@ -339,17 +459,30 @@ impl Builder<'_> {
                 && s.radius_mm() >= radius - SPREAD_MM
         });
         if !taken {
-            self.push(Role::Boss, Slot::bar(at, at, axis, radius, half, ROUND_MM));
+            let slot = Slot::bar(at, at, axis, radius, half, ROUND_MM);
+            self.push_following(Role::Boss, slot, Follow::point(anchor));
         }
     }
 
     /// One upright cylinder from the body's own layer through `span` (levels) in another layer: a
     /// riser without steps.
-    fn column(&mut self, role: Role, at: &Vector3<f64>, span: (f64, f64), radius: f64) {
+    pub(super) fn column(
+        &mut self,
+        role: Role,
+        at: &Vector3<f64>,
+        span: (f64, f64),
+        radius: f64,
+        anchor: &Anchor,
+    ) {
+        let slot = self.column_slot(at, span, radius);
+        self.push_following(role, slot, Follow::point(anchor));
+    }
+
+    pub(super) fn column_slot(&self, at: &Vector3<f64>, span: (f64, f64), radius: f64) -> Slot {
         let half = self.half() - BOSS_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len());
         let (low, high) = (span.0.min(self.level - half), span.1.max(self.level + half));
         let middle = self.at_level(at, (low + high) / 2.0);
-        self.push(role, Slot::bar(middle, middle, self.axis(), radius, (high - low) / 2.0, ROUND_MM));
+        Slot::bar(middle, middle, self.axis(), radius, (high - low) / 2.0, ROUND_MM)
     }
 
     /// Bars between the nodes, in the body's own layer.
@@ -357,24 +490,33 @@ impl Builder<'_> {
         for i in 0..self.nodes.len() {
             let (at, is_eye) = (self.nodes[i].at, self.nodes[i].own_eye.is_some());
             if !is_eye {
-                self.boss(at, self.boss_radius());
+                let anchor = self.nodes[i].anchor.clone();
+                self.boss(at, self.boss_radius(), &anchor);
             }
         }
         let points: Vec<Vector3<f64>> = self.nodes.iter().map(|n| n.at).collect();
         let net = connect(&points, |p, q| self.blocked(p, q));
         if let Some(hub) = net.hub {
-            self.boss(hub, self.boss_radius());
-            self.nodes.push(Node { at: hub, own_eye: None });
+            let nodes = self.nodes.iter().map(|n| (n.at, n.anchor.clone())).collect();
+            let anchor = Anchor::Hub { nodes, at: hub };
+            self.boss(hub, self.boss_radius(), &anchor);
+            self.nodes.push(Node { at: hub, own_eye: None, anchor });
         }
         for (i, j) in net.edges {
             self.bar(i, j, name);
         }
     }
 
-    /// Whether a bar would run into a flexure, its own ones included, or into another body's stub.
+    /// The same for a bar in the body's own layer.
     fn blocked(&self, p: &Vector3<f64>, q: &Vector3<f64>) -> bool {
-        let bar = Slot::bar(*p, *q, self.axis(), self.bar_radius(), self.half() - BAR_BELOW_MM, ROUND_MM);
-        let hits = |s: &Slot| separation(&bar, s).gap_mm < self.input.clearance_mm;
+        let half = self.half() - BAR_BELOW_MM;
+        let bar = Slot::bar(*p, *q, self.axis(), self.bar_radius(), half, ROUND_MM);
+        self.hits(&bar) || self.in_guide(&bar, false)
+    }
+
+    /// Whether a bar would run into a flexure, its own ones included, or into another body's stub.
+    pub(super) fn hits(&self, bar: &Slot) -> bool {
+        let hits = |s: &Slot| nearer_than(bar, s, self.input.clearance_mm);
         self.input.flexures.iter().any(|f| {
             let own = |at_end: bool| self.index == if at_end { f.bodies.1 } else { f.bodies.0 };
             let free = |s: &Slot| {
@@ -401,22 +543,38 @@ impl Builder<'_> {
         // The nose of the full-height piece stops short of the other bodies' eyes.
         let trim = |eye: &Option<EyeShape>| eye.map_or(0.0, |e| e.keep_out + radius);
         let (from, to) = (trim(&eyes.0), length - trim(&eyes.1));
+        let ends = [(p, self.nodes[i].anchor.clone()), (q, self.nodes[j].anchor.clone())];
         if eyes.0.is_none() && eyes.1.is_none() {
-            self.push(Role::Bar, Slot::bar(p, q, axis, radius, half, ROUND_MM));
+            let follow = Follow::bar(ends.map(|e| e.1));
+            self.push_following(Role::Bar, Slot::bar(p, q, axis, radius, half, ROUND_MM), follow);
             return;
         }
         if to - from < 0.0 {
             self.plan.notes.push(format!("`{name}`: two eyes stand too close for a bar between them."));
         }
+        let towards = |k: usize, along_mm: f64| Anchor::Toward {
+            nodes: Box::new([ends[k].clone(), ends[1 - k].clone()]),
+            along_mm,
+        };
+        // Where they are too close, both ends are that of the second eye.
+        let last = towards(1, length - to);
+        let first = if from <= to { towards(0, from) } else { towards(1, (length - to).min(length)) };
+        let anchors = [first, last];
         let (from, to) = (from.min(to).max(0.0), to.max(from.min(to)));
         let (start, end) = (p + along * from, p + along * to);
         let middle = (start + end) / 2.0;
-        self.push(Role::Bar, Slot::bar(start, end, axis, radius, half, ROUND_MM));
+        let halfway = Anchor::Middle(Box::new(anchors.clone()));
+        self.push_following(
+            Role::Bar,
+            Slot::bar(start, end, axis, radius, half, ROUND_MM),
+            Follow::bar(anchors),
+        );
         for eye in [eyes.0, eyes.1].into_iter().flatten() {
             let level = eye.center.dot(&axis);
             let neck = eye.half_height - BAR_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len());
             let inner = self.at_level(&middle, level);
-            self.push(Role::Bar, Slot::bar(eye.center, inner, axis, radius - 0.3, neck.max(0.1), ROUND_MM));
+            let slot = Slot::bar(eye.center, inner, axis, radius - 0.3, neck.max(LEAST_HALF_MM), ROUND_MM);
+            self.push_following(Role::Bar, slot, Follow::bar([Anchor::Fixed, halfway.clone()]));
         }
     }
 }

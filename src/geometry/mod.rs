@@ -3,8 +3,13 @@
 //!
 //! | file | holds |
 //! | --- | --- |
+//! | `input` | a design and its rods as the input of all others |
 //! | `parts` | the input, the grouping into printed parts, the build |
 //! | `link`, `skeleton` | a body as stubs, bosses, bars, eyes and risers |
+//! | `space` | a body whose joints point different ways |
+//! | `anchor`, `capsules` | how these follow the flexures; a body as capsules with derivatives by the design parameters |
+//! | `space`, `guide`, `riser` | a body whose joints point different ways; sliders; ways into other layers |
+//! | `carve`, `field`, `wall` | links that make way for their own flexures, and what is left of them |
 //! | `slot`, `sweep` | meshes of the primitives and of flexures |
 //! | `tidy` | removal of tiny edges before rounding to `f32` |
 //! | `union` | the boolean kernel's only client |
@@ -12,30 +17,45 @@
 //! | `joined` | parts of several instances |
 //! | `distance`, `gap`, `cycle` | least distances, overlaps in the rest pose, gaps over a cycle |
 
+pub mod anchor;
+pub mod capsules;
+pub mod carve;
 pub mod check;
 pub mod cycle;
 pub mod distance;
+mod field;
 pub mod gap;
+mod guide;
+pub mod input;
 pub mod joined;
+mod layers;
 pub mod link;
 pub mod mesh;
 pub mod parts;
 pub mod ray;
+mod riser;
 pub mod skeleton;
 pub mod slot;
+mod space;
 pub mod sweep;
 pub mod tidy;
 pub mod union;
+mod wall;
 
 #[cfg(test)]
 mod tests;
 
+pub use anchor::{Anchor, FlexureEnd, Follow, SizeBy};
+pub use capsules::{SkeletonCapsule, skeleton_capsules};
+pub use carve::{Carving, Cut, carve};
 pub use check::{MeshFacts, check_mesh};
-pub use cycle::{CycleGaps, LeastGap, MovedState, cycle_gaps};
+pub use cycle::{CycleGaps, LeastGap, MovedState, carved_cycle_gaps, cycle_gaps};
 pub use gap::{Fusion, Member};
+pub use input::{flexure_solid, parts_input};
 pub use mesh::Mesh;
 pub use parts::{
-    BodySolid, Bore, Eye, FlexureSolid, GeometryError, Part, Parts, PartsInput, build_parts, plan_bodies,
+    BodySolid, Bore, Eye, FlexureSolid, GeometryError, Guide, Part, Parts, PartsInput, build_carved_parts,
+    build_parts, plan_bodies,
 };
 pub use ray::Probe;
 pub use slot::{Facets, Slot};

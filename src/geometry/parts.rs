@@ -5,12 +5,15 @@
 //! [`FLOOR_MM`] left). A pin is dropped into the lower eye and caught under the upper one; flexures
 //! keep the layers apart, so nothing has to be glued. A motor's shaft passes the whole joint.
 
+use super::carve::{Carving, carve};
+use super::cycle::MovedState;
 use super::gap::{Fusion, fusions};
 use super::link::{BodyPlan, plan_body};
 use super::mesh::Mesh;
 use super::slot::Facets;
 use super::tidy::{SHORT_EDGE_MM, without_short_edges};
 use super::union::{BooleanError, subtract_all, union_all};
+use crate::math::Pose;
 use crate::rod::SectionShape;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -22,8 +25,6 @@ pub const FLOOR_MM: f64 = 1.2;
 /// Everything the printed parts are made of, in the rest pose; lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartsInput {
-    /// Unit axis along which planar links are stacked.
-    pub axis: Vector3<f64>,
     /// Height of a layer.
     pub height_mm: f64,
     /// Least clearance between moving parts.
@@ -34,16 +35,22 @@ pub struct PartsInput {
     pub bodies: Vec<BodySolid>,
     /// Flexures.
     pub flexures: Vec<FlexureSolid>,
+    /// How the bodies move over the cycle, as far as it is known while they are planned: the pose of each in every
+    /// state, relative to rest. Risers keep clear of what moves.
+    pub motion: Vec<Vec<Pose>>,
     /// Fineness of round shapes.
     pub facets: Facets,
 }
 
 /// A rigid body as a skeleton to be fleshed out.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct BodySolid {
     /// Name.
     pub name: String,
-    /// Height of the middle of the body's own layer, measured along the stacking axis from the origin.
+    /// Unit axis of the body's own layers, in which it is built of upright bars; none for a body whose joints point
+    /// different ways: it is a net of round bars in space.
+    pub axis: Option<Vector3<f64>>,
+    /// Height of the middle of the body's own layer, measured along its axis from the origin.
     pub level_mm: f64,
     /// Points the link must reach at its own level (their height along the axis is ignored): points listed for
     /// the body and conventional joints. Points of compliant joints do not belong here: there the
@@ -51,6 +58,25 @@ pub struct BodySolid {
     pub skeleton: Vec<Vector3<f64>>,
     /// Conventional hinges.
     pub eyes: Vec<Eye>,
+    /// Conventional sliders.
+    pub guides: Vec<Guide>,
+}
+
+/// A body's share of a conventional slider: a square bar in a sleeve.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Guide {
+    /// Index of the joint.
+    pub joint: usize,
+    /// The joint's physical point: the middle of the sleeve in the rest pose.
+    pub point: Vector3<f64>,
+    /// Unit direction in which the bar slides.
+    pub direction: Vector3<f64>,
+    /// Unit normal of one pair of the bar's faces.
+    pub normal: Vector3<f64>,
+    /// Least and largest way of the bar through the sleeve over the cycle, from the rest pose.
+    pub travel_mm: (f64, f64),
+    /// This body holds the sleeve, the other one the bar.
+    pub sleeve: bool,
 }
 
 /// A body's share of a conventional hinge.
@@ -60,7 +86,9 @@ pub struct Eye {
     pub joint: usize,
     /// The joint's physical point, in the middle of its layer.
     pub point: Vector3<f64>,
-    /// The hole along the stacking axis.
+    /// Unit axis of the joint, the same for all its bodies.
+    pub axis: Vector3<f64>,
+    /// The hole along the axis.
     pub bore: Bore,
     /// This body is number `slot.0`, counted from 0 upwards along the axis, of `slot.1` bodies.
     pub slot: (usize, usize),
@@ -138,6 +166,8 @@ pub struct Parts {
     pub parts: Vec<Part>,
     /// The rigid plan of each body, for distance checks over the cycle.
     pub plans: Vec<BodyPlan>,
+    /// Links that made way for their own flexures.
+    pub carving: Carving,
     /// Places where things grow together that must not.
     pub fusions: Vec<Fusion>,
 }
@@ -179,13 +209,28 @@ impl std::error::Error for GeometryError {}
 /// rest pose are no errors: they are returned as [`Parts::fusions`].
 pub fn build_parts(input: &PartsInput) -> Result<Parts, GeometryError> {
     let plans = plan_bodies(input)?;
+    build_planned(input, plans, Carving::default())
+}
+
+/// The same with links carved where a flexure attached to them would hit them, in the rest pose or in one of the
+/// `states`.
+///
+/// # Errors
+/// As [`build_parts`].
+pub fn build_carved_parts(input: &PartsInput, states: &[MovedState]) -> Result<Parts, GeometryError> {
+    let plans = plan_bodies(input)?;
+    let carving = carve(input, &plans, states)?;
+    build_planned(input, plans, carving)
+}
+
+fn build_planned(input: &PartsInput, plans: Vec<BodyPlan>, carving: Carving) -> Result<Parts, GeometryError> {
     let groups = groups(input);
-    let fusions = fusions(input, &plans, &groups);
+    let fusions = fusions(input, &plans, &groups, &carving);
     let parts = groups
         .par_iter()
-        .map(|bodies| build_part(input, &plans, bodies))
+        .map(|bodies| build_part(input, &plans, &carving, bodies))
         .collect::<Result<Vec<Part>, GeometryError>>()?;
-    Ok(Parts { parts, plans, fusions })
+    Ok(Parts { parts, plans, carving, fusions })
 }
 
 /// The primitives of every body, without any meshing: enough for distance checks.
@@ -213,12 +258,20 @@ pub fn groups(input: &PartsInput) -> Vec<Vec<usize>> {
         .collect()
 }
 
-fn build_part(input: &PartsInput, plans: &[BodyPlan], bodies: &[usize]) -> Result<Part, GeometryError> {
+fn build_part(
+    input: &PartsInput,
+    plans: &[BodyPlan],
+    carving: &Carving,
+    bodies: &[usize],
+) -> Result<Part, GeometryError> {
     let name = bodies.first().map(|i| input.bodies[*i].name.clone()).unwrap_or_default();
     let failed = |error| GeometryError::Boolean { name: name.clone(), error };
     let mut solids: Vec<Mesh> = bodies
         .par_iter()
         .map(|i| {
+            if let Some(link) = carving.links.get(i) {
+                return Ok(link.clone());
+            }
             let plan = &plans[*i];
             let body = union_all(&plan.meshes(&input.facets))?;
             subtract_all(&body, &plan.bore_meshes(&input.facets))
@@ -236,17 +289,30 @@ fn build_part(input: &PartsInput, plans: &[BodyPlan], bodies: &[usize]) -> Resul
 fn validate(input: &PartsInput) -> Result<(), GeometryError> {
     let fail = |text: String| Err(GeometryError::Input(text));
     let finite = |p: &Vector3<f64>| p.iter().all(|x| x.is_finite() && x.abs() < 1e6);
-    if (input.axis.norm() - 1.0).abs() > 1e-6 || !finite(&input.axis) {
-        return fail("the stacking axis is not a unit vector".into());
-    }
     let positive = |x: f64| x.is_finite() && x > 0.0;
     if !positive(input.height_mm) || !positive(input.clearance_mm) || !positive(input.least_wall_mm) {
         return fail("layer height, clearance and least wall must be positive".into());
     }
     for body in &input.bodies {
         let points = body.skeleton.iter().chain(body.eyes.iter().map(|e| &e.point));
+        let unit = |a: &Vector3<f64>| finite(a) && (a.norm() - 1.0).abs() < 1e-6;
+        if !body.axis.iter().chain(body.eyes.iter().map(|e| &e.axis)).all(unit) {
+            return fail(format!("an axis of `{}` is not a unit vector", body.name));
+        }
         if !points.clone().all(finite) || !body.level_mm.is_finite() {
             return fail(format!("a point of `{}` is not finite", body.name));
+        }
+        for guide in &body.guides {
+            let across = guide.direction.dot(&guide.normal).abs() < 1e-6;
+            if !unit(&guide.direction) || !unit(&guide.normal) || !across || !finite(&guide.point) {
+                return fail(format!("a guide of `{}` has no direction", body.name));
+            }
+            if guide.travel_mm.0.is_nan()
+                || guide.travel_mm.1.is_nan()
+                || guide.travel_mm.0 > guide.travel_mm.1
+            {
+                return fail(format!("a guide of `{}` has no way", body.name));
+            }
         }
         for eye in &body.eyes {
             if eye.slot.0 >= eye.slot.1 || eye.slot.1 > 8 {
@@ -256,6 +322,9 @@ fn validate(input: &PartsInput) -> Result<(), GeometryError> {
                 return fail(format!("a bore of `{}` has no positive diameter", body.name));
             }
         }
+    }
+    if input.motion.iter().any(|poses| poses.len() != input.bodies.len()) {
+        return fail("a state has not one pose a body".into());
     }
     for f in &input.flexures {
         let n = f.centreline.len();

@@ -101,6 +101,27 @@ impl Slot {
         ((self.start + self.end) / 2.0, core + self.round_mm)
     }
 
+    /// Signed distance of a point, mm, negative inside; exact outside, and inside where no edge is near.
+    pub fn signed_distance(&self, p: &Vector3<f64>) -> f64 {
+        let d = self.end - self.start;
+        let n = d.norm_squared();
+        let u = if n > 0.0 { ((p - self.start).dot(&d) / n).clamp(0.0, 1.0) } else { 0.0 };
+        let off = p - self.start - d * u;
+        let up = off.dot(&self.axis);
+        let x = (off - self.axis * up).norm() - self.disc_radius_mm;
+        let y = up.abs() - self.half_height_mm;
+        x.max(0.0).hypot(y.max(0.0)) + x.max(y).min(0.0) - self.round_mm
+    }
+
+    /// Half the size of the bounding box of a slot without length, mm.
+    pub(super) fn extent(&self) -> Vector3<f64> {
+        self.axis.map(|n| {
+            self.disc_radius_mm * (1.0 - n * n).max(0.0).sqrt()
+                + self.half_height_mm * n.abs()
+                + self.round_mm
+        })
+    }
+
     /// The slot moved with its body.
     pub fn moved(&self, pose: &Pose) -> Self {
         Self {

@@ -64,17 +64,21 @@ impl FlexureSolid {
     pub fn slots(&self) -> Vec<Slot> {
         let count = self.centreline.len().min(self.m2.len()).min(self.a_mm.len()).min(self.b_mm.len());
         (1..count)
-            .map(|i| Slot {
+            .map(|i| {
+                let larger = |v: &[f64]| v[i - 1].max(v[i]);
+                (i, larger(&self.a_mm), larger(&self.b_mm))
+            })
+            .map(|(i, a, b)| Slot {
                 start: self.centreline[i - 1],
                 end: self.centreline[i],
                 axis: self.m2[i - 1],
                 disc_radius_mm: 0.0,
                 // The fan reaches round a rectangle's corners, and just to an ellipse's rim.
                 half_height_mm: match self.section {
-                    SectionShape::Ellipse => (self.b_mm[i] - self.a_mm[i]).max(0.0),
-                    SectionShape::Rectangle => self.b_mm[i],
+                    SectionShape::Ellipse => (b - a).max(0.0),
+                    SectionShape::Rectangle => b,
                 },
-                round_mm: self.a_mm[i],
+                round_mm: a,
             })
             .collect()
     }

@@ -2,8 +2,11 @@
 
 use super::check::{check_mesh, crossing_pairs};
 use super::distance::separation;
+use super::field::Field;
+use super::link::{BodyPlan, Role};
 use super::skeleton::connect;
 use super::union::{BooleanError, subtract_all, union_all};
+use super::wall::{Wall, least_wall};
 use super::{Facets, Mesh, Probe, Slot};
 use nalgebra::Vector3;
 use std::f64::consts::PI;
@@ -227,4 +230,84 @@ fn hub_or_chain_whichever_is_shorter() {
     let blocked = |p: &Vector3<f64>, q: &Vector3<f64>| (p.x - q.x).abs() < 15.0 && p.x.min(q.x) < 5.0;
     assert_eq!(connect(&line, blocked).edges, vec![(0, 1), (1, 2)]);
     assert_eq!(connect(&line[..1], free).edges, vec![]);
+}
+
+#[test]
+fn signed_distances_agree_with_those_of_slots() {
+    let slots = [
+        Slot::capsule(v(0.0, 0.0, 0.0), v(6.0, 2.0, -3.0), 1.5),
+        Slot::bar(v(0.0, 0.0, 0.0), v(7.0, 0.0, 0.0), Vector3::z(), 3.0, 2.0, 0.6),
+        Slot::bar(v(1.0, 0.0, 0.0), v(1.0, 0.0, 0.0), Vector3::y(), 3.0, 4.0, 0.0),
+    ];
+    for slot in slots {
+        for k in 0..60 {
+            let t = k as f64;
+            let p = v(9.0 * (0.9 * t).cos(), 9.0 * (0.7 * t).sin(), 8.0 * (0.4 * t).sin());
+            let gap = separation(&slot, &sphere(p, 0.0)).gap_mm;
+            let signed = slot.signed_distance(&p);
+            if gap > 0.0 {
+                assert!((signed - gap).abs() < 1e-6, "{slot:?} {p}: {signed} {gap}");
+            } else {
+                assert!(signed <= 1e-6, "{slot:?} {p}: {signed} {gap}");
+            }
+        }
+        assert!(slot.signed_distance(&((slot.start + slot.end) / 2.0)) < -1.4);
+    }
+}
+
+/// Surfaces of fields are sound whatever they bound, and lie where they should.
+#[test]
+fn a_field_has_a_closed_surface() {
+    let capsule = Slot::capsule(v(0.3, 0.2, 0.1), v(8.0, 3.0, -2.0), 1.0);
+    let mut field = Field::new(&v(-4.0, -4.0, -6.0), &v(12.0, 7.0, 4.0), 0.4, 1.0);
+    field.add(&capsule, 0.5, 1.0);
+    let mesh = field.surface();
+    assert!(check_mesh(&mesh).is_printable());
+    let grown = Slot { round_mm: 1.5, ..capsule };
+    assert!((mesh.volume_mm3() / grown.volume_mm3() - 1.0).abs() < 0.02);
+    for p in &mesh.vertices {
+        assert!(grown.signed_distance(p).abs() < 0.04, "{}", grown.signed_distance(p));
+    }
+    // Sheets, two pieces, and a field cut off by the border of its grid.
+    let sheet = Slot { half_height_mm: 3.0, ..Slot::capsule(v(0.0, 4.0, 1.0), v(6.0, 5.0, 1.0), 0.6) };
+    field.add(&Slot { axis: v(0.0, 0.0, 1.0), ..sheet }, 0.2, 1.0);
+    field.add(&sphere(v(-3.5, -3.5, -5.0), 2.0), 0.0, 1.0);
+    let facts = check_mesh(&field.surface());
+    assert!(
+        facts.closed && facts.oriented && facts.self_intersections == 0 && facts.components == 3,
+        "{facts:?}"
+    );
+    assert!((field.at(&v(4.0, 1.6, -1.0), 9.0) - grown.signed_distance(&v(4.0, 1.6, -1.0))).abs() < 0.05);
+    assert_eq!(field.at(&v(40.0, 0.0, 0.0), 9.0), 9.0);
+}
+
+/// A bar 8 mm wide and 10 mm high, cut into from above: what is left of it, and when nothing is.
+#[test]
+fn the_least_wall_of_a_notched_bar() {
+    let bar = Slot::bar(v(0.0, 0.0, 0.0), v(40.0, 0.0, 0.0), Vector3::z(), 4.0, 5.0, 0.5);
+    let boss = |x: f64| Slot::bar(v(x, 0.0, 0.0), v(x, 0.0, 0.0), Vector3::z(), 4.5, 5.2, 0.5);
+    let plan = BodyPlan {
+        slots: vec![(Role::Bar, bar), (Role::Boss, boss(0.0)), (Role::Boss, boss(40.0))],
+        ..BodyPlan::default()
+    };
+    let whole = least_wall(&plan, &[]);
+    assert!(matches!(whole, Wall::Least(w) if (w - 8.0).abs() < 0.4), "{whole:?}");
+    for left in [4.0, 2.0, 1.0] {
+        let mut notch = Field::new(&v(10.0, -8.0, -8.0), &v(30.0, 8.0, 12.0), 0.6, 1.0);
+        let bottom = left - 5.0 + 1.5;
+        let (start, end) = (v(20.0, -7.0, bottom), v(20.0, 7.0, bottom));
+        // Everything above the bottom goes.
+        for up in 0..8 {
+            let lift = v(0.0, 0.0, up as f64);
+            notch.add(&Slot::capsule(start + lift, end + lift, 1.5), 0.0, 1.2);
+        }
+        let wall = least_wall(&plan, &[(0, &notch)]);
+        assert!(matches!(wall, Wall::Least(w) if (w - left).abs() < 0.3), "{left}: {wall:?}");
+    }
+    let mut through = Field::new(&v(10.0, -8.0, -8.0), &v(30.0, 8.0, 8.0), 0.6, 1.0);
+    for up in -7..8 {
+        let lift = f64::from(up);
+        through.add(&Slot::capsule(v(20.0, -7.0, lift), v(20.0, 7.0, lift), 1.0), 0.0, 1.2);
+    }
+    assert_eq!(least_wall(&plan, &[(0, &through)]), Wall::Apart);
 }

@@ -1,7 +1,8 @@
 //! An [`Assembly`] is what a file builds: designs, and where instances of them stand. A single mechanism is an
 //! assembly of one instance without a name, where it was drawn.
 
-use super::{BodyId, Design, Export, JointKind, Origin, Profile, Requirement};
+use super::expr::{ExprGraph, Node};
+use super::{BodyId, Design, Drive, Export, JointKind, Origin, Profile, Requirement};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -214,6 +215,15 @@ impl Assembly {
     }
 }
 
+impl Drive {
+    /// Turns the drive the other way; `exprs` is its design's graph.
+    pub fn reverse(&mut self, exprs: &mut ExprGraph) {
+        self.profile = self.profile.reversed();
+        self.rest = -self.rest;
+        self.free_rest = self.free_rest.map(|id| exprs.push(Node::Neg(id)));
+    }
+}
+
 impl Profile {
     /// The same the other way round.
     pub fn reversed(&self) -> Self {
@@ -221,7 +231,7 @@ impl Profile {
             Profile::Range { from, to } => Profile::Range { from: -from, to: -to },
             Profile::Expression { graph, value } => {
                 let mut graph = graph.clone();
-                let value = graph.push(super::expr::Node::Neg(*value));
+                let value = graph.push(Node::Neg(*value));
                 Profile::Expression { graph, value }
             }
             Profile::Keys { smooth, keys, closed } => Profile::Keys {

@@ -16,8 +16,11 @@ pub struct Drive {
     pub unit: DriveUnit,
     /// Value over the cycle, relative to the drawing pose, rad or mm.
     pub profile: Profile,
-    /// Value in the rest pose, rad or mm.
+    /// Value in the rest pose at the start of the free variables, rad or mm.
     pub rest: f64,
+    /// The same as an expression, where it depends on a free variable.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub free_rest: Option<ExprId>,
     /// Motor, if stated.
     pub motor: Option<Motor>,
     /// The motor turns continuously.
@@ -30,6 +33,11 @@ impl Drive {
     /// Value at t in 0..1, rad or mm.
     pub fn value(&self, t: f64) -> f64 {
         self.profile.value(t)
+    }
+
+    /// Value in the rest pose, rad or mm; `values` are those of all nodes of the design's graph.
+    pub fn rest_value(&self, values: &[f64]) -> f64 {
+        self.free_rest.map_or(self.rest, |id| values.get(id.0 as usize).copied().unwrap_or(f64::NAN))
     }
 
     /// Whether the drive is in the same pose at t = 0 and t = 1: for a turning one also whole turns later.

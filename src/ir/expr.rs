@@ -2,6 +2,7 @@
 //! as an expression, not a number, so that geometry can be differentiated.
 
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
 /// Index into [`ExprGraph::nodes`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -151,6 +152,38 @@ impl ExprGraph {
             }
         }
         Node::Const(apply(&node, v[0], v[1]))
+    }
+
+    /// Marks every node that `roots` depend on, themselves too.
+    pub fn reachable(&self, roots: &[ExprId]) -> Vec<bool> {
+        let mut seen = vec![false; self.nodes.len()];
+        let mark = |seen: &mut Vec<bool>, id: ExprId| {
+            if let Some(s) = seen.get_mut(id.0 as usize) {
+                *s = true;
+            }
+        };
+        for r in roots {
+            mark(&mut seen, *r);
+        }
+        // Operands stand earlier, so one pass backwards is enough.
+        for (i, node) in self.nodes.iter().enumerate().rev() {
+            if seen.get(i).copied().unwrap_or(false) {
+                for id in node.operands().into_iter().flatten() {
+                    mark(&mut seen, id);
+                }
+            }
+        }
+        seen
+    }
+
+    /// Indices of the free variables that `roots` depend on, in order.
+    pub fn free_variables(&self, roots: &[ExprId]) -> BTreeSet<usize> {
+        let seen = self.reachable(roots);
+        let free = |(node, seen): (&Node, bool)| match node {
+            Node::Free(i) if seen => Some(*i as usize),
+            _ => None,
+        };
+        self.nodes.iter().zip(seen).filter_map(free).collect()
     }
 
     /// Value of every node at the free variables `p`.

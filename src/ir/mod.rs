@@ -1,15 +1,21 @@
 //! The narrow waist: a [`Design`] is all that elaboration hands to the numerical stages, and a
 //! [`Solution`] all that they hand back. Plain data; units are mm, N, MPa, rad, s throughout.
 
+mod aim;
 pub mod assembly;
 mod drive;
 pub mod expr;
+mod load;
+mod model;
 mod solution;
 
 pub use crate::diagnostic::Origin;
+pub use aim::{Aims, BodyAngle, Direction, Target, TargetOf, TargetPath};
 pub use assembly::{Assembly, Instance, Placement};
 pub use drive::{Drive, DriveUnit, Profile};
 use expr::{ExprGraph, ExprId};
+pub use load::{Load, LoadKind};
+pub use model::RodModel;
 use serde::{Deserialize, Serialize};
 pub use solution::Solution;
 
@@ -35,12 +41,21 @@ pub struct Design {
     pub joints: Vec<Joint>,
     /// Rods of all compliant joints.
     pub rods: Vec<Rod>,
+    /// Theory of the rods.
+    #[serde(default, skip_serializing_if = "RodModel::is_default")]
+    pub model: RodModel,
     /// Drives.
     pub drives: Vec<Drive>,
+    /// Loads from outside.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub loads: Vec<Load>,
     /// Steps and duration.
     pub cycle: Cycle,
     /// Traced points.
     pub traces: Vec<Trace>,
+    /// Traced directions, targets, angles of bodies.
+    #[serde(default, skip_serializing_if = "Aims::is_empty")]
+    pub aims: Aims,
     /// Terms of the objective.
     pub objectives: Vec<Objective>,
     /// Acceptance tests.
@@ -55,6 +70,20 @@ pub struct Design {
     pub exports: Vec<Export>,
     /// The whole mechanism declaration.
     pub origin: Origin,
+}
+
+impl Design {
+    /// Indices of the free variables that move the conventional mechanism, its rest pose, or end frames of flexures.
+    pub fn geometry_variables(&self) -> Vec<usize> {
+        let mut roots: Vec<ExprId> = Vec::new();
+        for joint in &self.joints {
+            roots.extend(joint.point);
+            roots.extend(joint.toward.iter().flat_map(|(_, q)| q));
+        }
+        roots.extend(self.traces.iter().flat_map(|t| t.point));
+        roots.extend(self.drives.iter().filter_map(|d| d.free_rest));
+        self.exprs.free_variables(&roots).into_iter().collect()
+    }
 }
 
 /// A design variable: `free START in LOWER .. UPPER`.
@@ -85,6 +114,10 @@ pub struct Body {
     pub skeleton: Vec<NamedPoint>,
     /// Layer along the stacking axis.
     pub layer: i32,
+    /// Of a body that a template brings along, the joint it belongs to: it is called `joint.body`, stands after the
+    /// text's bodies and has no skeleton. The conventional mechanism carries it with the joint's first body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub owner: Option<JointId>,
     /// Declaration.
     pub origin: Origin,
 }
@@ -203,15 +236,33 @@ pub struct Rod {
     pub from: RodEnd,
     /// End.
     pub to: RodEnd,
-    /// Cross-section.
+    /// Its ends' e3 is the second axis of a universal joint.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub second_axis: bool,
+    /// Cross-section, of a tapered rod at its start.
     pub section: Section,
+    /// Of a tapered rod the cross-section at its end, of the same shape: half widths run linearly in arc length.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub section_to: Option<Section>,
     /// Declaration in the template.
     pub origin: Origin,
 }
 
-/// One end of a rod, in the end frame of its body at the joint: e3 the joint axis, e1 from the joint
-/// point towards the centroid of the body's other joint points (or the `toward` point) normal to e3,
-/// e2 = e3 × e1, all in the rest pose. Origin: the joint's physical point (with its layer's offset).
+fn is_false(b: &bool) -> bool {
+    !b
+}
+
+/// One end of a rod, in the end frame of its body at the joint, in the rest pose. Let w be the way from the joint
+/// point to the centroid of the body's other joint points (or to the `toward` point). e2 = e3 × e1 always, and of a
+///
+/// - hinge: e3 the axis, e1 along w, normal to e3;
+/// - ball: e1 along w, e3 world z (x where w is parallel to it), normal to e1;
+/// - universal joint: e3 the first axis (or the second, [`Rod::second_axis`]), e1 normal to both on the side of w;
+/// - slider: e2 the axis, e1 along w, normal to e2, so that e3 lies across the motion; w is that of the joint's
+///   first body, whose frame serves every end.
+///
+/// An end in a body of the template's own takes the frame of the rod's other end (of the joint's first body where
+/// that is an own one too). Origin: the joint's physical point (with its layer's offset).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RodEnd {
     /// The body it is clamped in.
@@ -324,12 +375,60 @@ pub enum ObjectiveKind {
         /// Stress that counts as one; none: SI (1 Pa).
         scale_mpa: Option<f64>,
     },
+    /// Links and flexures nearer to each other than a gap (paper, eq. 7), in m² of their lengths.
+    Collision {
+        /// The gap.
+        gap_mm: f64,
+    },
     /// Soft maximum of the squared torque (paper, eq. 6, made monotone).
     Torque {
         /// Index into [`Design::drives`].
         drive: usize,
         /// Torque that counts as one: the motor's stall torque, or the scale in the text.
         reference_n_mm: f64,
+    },
+    /// Tracking by form or with an emphasis of its own.
+    TrackAs {
+        /// Index into [`Design::traces`].
+        trace: usize,
+        /// Length that counts as one; none: SI (1 m).
+        scale_mm: Option<f64>,
+        /// Distance from the nearest place of the target, at whatever time; else from that of the same time.
+        closest: bool,
+        /// Weight of each time.
+        emphasis: Option<Profile>,
+    },
+    /// Angle between a traced direction and its target.
+    Aim {
+        /// Index into [`Aims::directions`].
+        direction: usize,
+        /// Angle that counts as one; none: SI (1 rad).
+        scale_rad: Option<f64>,
+        /// Weight of each time.
+        emphasis: Option<Profile>,
+    },
+    /// Displacement of a trace under one force of stated direction.
+    SwayAlong {
+        /// Index into [`Design::traces`].
+        trace: usize,
+        /// Size of the force.
+        force_n: f64,
+        /// Length that counts as one; none: SI (1 m).
+        scale_mm: Option<f64>,
+        /// Its unit direction in space; none: the in-plane normal of the conventional path.
+        along: Option<[f64; 3]>,
+    },
+    /// The paper's soft maximum of the squared torque (eq. 6).
+    PaperTorque {
+        /// Index into [`Design::drives`].
+        drive: usize,
+        /// Torque that counts as one.
+        reference_n_mm: f64,
+    },
+    /// The paper's soft maximum of von Mises stress (eq. 16).
+    PaperStress {
+        /// Stress that counts as one; none: SI (1 Pa).
+        scale_mpa: Option<f64>,
     },
 }
 
@@ -382,6 +481,12 @@ pub enum Quantity {
     Torque(usize),
     /// Size of a slider drive's force, N. Index into [`Design::drives`].
     Force(usize),
+    /// Distance of a trace from the nearest place of its target, mm. Index into [`Design::traces`].
+    ErrorClosest(usize),
+    /// Angle between a traced direction and its target, rad. Index into [`Aims::directions`].
+    AimError(usize),
+    /// How far a body has turned, rad. Index into [`Aims::angles`].
+    Angle(usize),
 }
 
 /// Material data; what the text does not state is absent.

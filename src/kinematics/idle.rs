@@ -2,15 +2,22 @@
 //! else moves. They are found by rank: which combinations of such turns violate no constraint and no drive.
 
 use super::constraint::Constraint;
-use super::linear::{RANK_TOLERANCE, Rows};
+use super::linear::{RANK_TOLERANCE, Rows, moved};
 use super::mechanism::Mechanism;
+use super::path::correct;
+use crate::ir::expr::Evaluated;
 use crate::ir::{BodyId, Design};
-use nalgebra::{DMatrix, DVector, Vector3};
+use crate::math::{Pose, skew};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 /// Points this near to a line, in lengths L, lie on it. Drawn points are exact to 1e-14 of that.
 const ON_LINE: f64 = 1e-9;
 /// Bodies with a smaller share in an idle freedom (of unit length) take no part in it.
 const TAKES_PART: f64 = 1e-6;
+/// Sine of the turn left to an idle body in the rest pose.
+const UNTURNED: f64 = 1e-13;
+/// Newton iterations for that; three to five are usual.
+const UNTURNING: usize = 20;
 
 /// One idle freedom.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,7 +72,8 @@ pub(super) fn find(mechanism: &Mechanism) -> Vec<Idle> {
         .collect()
 }
 
-/// Direction of the line through all joint points and traces of a body, if there is one.
+/// Direction of the line through all joint points and traces of a body, if there is one and nothing else that is asked
+/// for turns with the body about it.
 fn line(mechanism: &Mechanism, body: BodyId) -> Option<Vector3<f64>> {
     let design = mechanism.design;
     let own = design.joints.iter().zip(&mechanism.joint_points).filter(|(j, _)| j.bodies.contains(&body));
@@ -75,7 +83,74 @@ fn line(mechanism: &Mechanism, body: BodyId) -> Option<Vector3<f64>> {
     let direction = far.try_normalize(ON_LINE * mechanism.length)?;
     let traced = mechanism.traces.iter().filter(|t| t.0 == body).map(|t| &t.1);
     let off = joints.into_iter().chain(traced).map(|p| direction.cross(&(p - start)).norm());
+    let aims = &design.aims;
+    let turns = |d: &crate::ir::Direction| direction.cross(&Vector3::from(d.direction)).norm() > ON_LINE;
+    if aims.angles.iter().any(|a| a.body == body)
+        || aims.directions.iter().any(|d| d.body == body && turns(d))
+    {
+        return None;
+    }
     (off.fold(0.0, f64::max) <= ON_LINE * mechanism.length).then_some(direction)
+}
+
+/// Derivatives of [`line`] by the free variables, one a variable.
+pub(super) fn line_derivative(
+    mechanism: &Mechanism,
+    body: BodyId,
+    values: &Evaluated,
+) -> Option<Vec<Vector3<f64>>> {
+    let design = mechanism.design;
+    let own: Vec<usize> =
+        (0..design.joints.len()).filter(|j| design.joints[*j].bodies.contains(&body)).collect();
+    let start = *own.first()?;
+    let at = |j: usize| mechanism.joint_points[j] - mechanism.joint_points[start];
+    let far = own.into_iter().max_by(|a, b| at(*a).norm().total_cmp(&at(*b).norm()))?;
+    let direction = at(far).try_normalize(0.0)?;
+    let point = |j: usize, i: usize| {
+        Vector3::from(design.joints[j].point.map(|id| values.gradient(id).get(i).copied().unwrap_or(0.0)))
+    };
+    let by = |i: usize| {
+        let d = point(far, i) - point(start, i);
+        (d - direction * direction.dot(&d)) / at(far).norm()
+    };
+    Some((0..design.free.len()).map(by).collect())
+}
+
+/// How far a body has turned about the line it had in the drawing, as a sine: the turn is this vector times the line's
+/// direction. Zero where the rotation only takes the line from one direction to the other.
+pub(super) fn turn_direction(rotation: &Matrix3<f64>) -> Vector3<f64> {
+    let odd = (rotation - rotation.transpose()) * 0.5;
+    Vector3::new(odd[(2, 1)], odd[(0, 2)], odd[(1, 0)])
+}
+
+/// Derivative of `turn_direction · axis` by a further turn dφ.
+pub(super) fn turn_slope(rotation: &Matrix3<f64>, axis: &Vector3<f64>) -> Vector3<f64> {
+    let by = |unit: Vector3<f64>| turn_direction(&(skew(&unit) * rotation)).dot(axis);
+    Vector3::new(by(Vector3::x()), by(Vector3::y()), by(Vector3::z()))
+}
+
+/// Turns idle bodies back about their lines. Following the drives leaves them turned by whatever the way added up to;
+/// so the pose depends on the drives' values alone, and smoothly on the drawing.
+pub(super) fn unturn(mechanism: &Mechanism, poses: &[Pose], drive: &[f64]) -> Option<Vec<Pose>> {
+    let mut poses = poses.to_vec();
+    for _ in 0..UNTURNING {
+        let rows = Rows::at(mechanism, &poses, drive);
+        let factor = rows.factor()?;
+        let turned = |i: &Idle| turn_direction(&poses[i.body].rotation).dot(&i.axis);
+        if mechanism.idle.iter().all(|i| turned(i).abs() < UNTURNED) {
+            return Some(poses);
+        }
+        let mut step = DVector::zeros(mechanism.unknowns());
+        for (k, idle) in mechanism.idle.iter().enumerate() {
+            let motion = rows.idle_motion(&factor, k);
+            let first = mechanism.column.get(idle.body).copied().flatten()? + 3;
+            let slope = turn_slope(&poses[idle.body].rotation, &idle.axis);
+            let rate: f64 = (0..3).map(|c| slope[c] * motion[first + c]).sum();
+            step.axpy(-turned(idle) / rate, &motion, 1.0);
+        }
+        poses = correct(mechanism, &moved(mechanism, &poses, &step), drive)?.poses;
+    }
+    None
 }
 
 /// Scaled motion of a body that turns about its line. Its centre lies on the line.

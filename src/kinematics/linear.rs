@@ -117,6 +117,30 @@ impl Rows {
         out
     }
 
+    /// The motion that keeps all rows and gauges when the residuals move by `by`: J x = −by, which must have a solution.
+    pub fn follow(&self, factor: &Factor, by: &[f64]) -> DVector<f64> {
+        let mut x = DVector::zeros(self.unknowns);
+        // Repeated, so that neither the shift nor the squared condition is left.
+        for _ in 0..3 {
+            let mut right = DVector::zeros(self.unknowns);
+            let wanted = by.iter().copied().chain(std::iter::repeat(0.0));
+            for (row, b) in self.rows.iter().chain(&self.gauges).zip(wanted) {
+                row.add_to(&mut right, -(b + row.times(&x)));
+            }
+            x += factor.solve(right);
+        }
+        x
+    }
+
+    /// The idle motion that moves gauge number `gauge` by one and no other.
+    pub fn idle_motion(&self, factor: &Factor, gauge: usize) -> DVector<f64> {
+        let mut right = DVector::zeros(self.unknowns);
+        if let Some(row) = self.gauges.get(gauge) {
+            row.add_to(&mut right, 1.0);
+        }
+        factor.solve(right)
+    }
+
     /// Factor of the (slightly shifted) normal matrix; none if an entry is not finite.
     pub fn factor(&self) -> Option<Factor> {
         let mut normal = self.product(self);
@@ -166,6 +190,10 @@ impl Rows {
 impl Row {
     fn blocks(&self) -> impl Iterator<Item = (usize, &[f64; 6])> {
         self.column.iter().zip(&self.entries).filter_map(|(column, entries)| Some(((*column)?, entries)))
+    }
+
+    fn times(&self, x: &DVector<f64>) -> f64 {
+        self.blocks().map(|(j, block)| block.iter().enumerate().map(|(k, e)| e * x[j + k]).sum::<f64>()).sum()
     }
 
     fn add_to(&self, out: &mut DVector<f64>, factor: f64) {

@@ -5,8 +5,8 @@ use super::constraint::Constraint;
 use super::idle::{self, Idle};
 use super::value::JointValue;
 use crate::diagnostic::Diagnostic;
-use crate::ir::{Design, Drive, DriveUnit, JointId, JointKind};
-use crate::math::Pose;
+use crate::ir::{Design, Drive, DriveUnit, JointId, JointKind, LoadKind};
+use crate::math::{Pose, nearest_turn, twist_about};
 use nalgebra::Vector3;
 
 /// Sizes beyond which a file is taken for a mistake.
@@ -40,7 +40,7 @@ pub struct Mechanism<'d> {
     pub traces: Vec<(usize, Vector3<f64>)>,
     /// Characteristic length L, mm: root mean square distance of the joint points from the centres of their bodies.
     pub length: f64,
-    /// First scaled unknown of every body; none for ground.
+    /// First scaled unknown of every body; none for ground and for bodies of flexures.
     pub(super) column: Vec<Option<usize>>,
 }
 
@@ -106,8 +106,9 @@ impl<'d> Mechanism<'d> {
         let mut column = Vec::new();
         let mut next = 0;
         for body in &design.bodies {
-            column.push((!body.ground).then_some(next));
-            next += if body.ground { 0 } else { 6 };
+            let moves = !body.ground && body.owner.is_none();
+            column.push(moves.then_some(next));
+            next += if moves { 6 } else { 0 };
         }
         let (drawing, length) = centers(design, &joint_points, &traces);
         let values = joint_values;
@@ -141,10 +142,26 @@ impl<'d> Mechanism<'d> {
         self.traces.iter().map(|(body, point)| poses[*body].point(point)).collect()
     }
 
-    /// Value of every joint, rad (on the branch nearest `near`) or mm; zero for joints without one.
+    /// Puts the bodies that flexures bring along where the first body of their joint carries them.
+    pub(super) fn carry(&self, poses: &mut [Pose]) {
+        carry(self.design, poses);
+    }
+
+    /// Value of every joint, rad (on the branch nearest `near`) or mm; zero for joints without one. Then the angle of
+    /// every body that is asked for, rad, nearest to `near` too.
     pub fn joint_values(&self, poses: &[Pose], near: &[f64]) -> Vec<f64> {
         let value = |(value, near): (&Option<JointValue>, &f64)| value.map_or(0.0, |v| v.value(poses, *near));
-        self.values.iter().zip(near).map(value).collect()
+        let mut out: Vec<f64> = self.values.iter().zip(near).map(value).collect();
+        let asked = self.design.aims.angles.iter().zip(near.iter().skip(self.values.len()));
+        out.extend(asked.map(|(a, near)| {
+            nearest_turn(twist_about(&poses[a.body].rotation, &Vector3::from(a.axis)), *near)
+        }));
+        out
+    }
+
+    /// Length of [`Self::joint_values`].
+    pub(super) fn value_count(&self) -> usize {
+        self.values.len() + self.design.aims.angles.len()
     }
 }
 
@@ -165,14 +182,26 @@ fn centers(
             points.extend(traces.iter().filter(|t| t.0 == id).map(|t| t.1));
         }
         let center = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
-        if !body.ground {
+        if !body.ground && body.owner.is_none() {
             square += points.iter().map(|p| (p - center).norm_squared()).sum::<f64>();
             count += points.len();
         }
         poses.push(Pose::rest(center));
     }
+    carry(design, &mut poses);
     let length = (square / count.max(1) as f64).sqrt();
     (poses, if length > 0.0 { length } else { 1.0 })
+}
+
+fn carry(design: &Design, poses: &mut [Pose]) {
+    for (id, body) in design.bodies.iter().enumerate() {
+        let carrier = body.owner.and_then(|j| design.joints.get(j)?.bodies.first());
+        if let Some(pose) = carrier.and_then(|b| poses.get(*b)).copied()
+            && let Some(own) = poses.get_mut(id)
+        {
+            *own = pose;
+        }
+    }
 }
 
 /// Indices of a design may come from a file: nothing below may trip over them.
@@ -180,19 +209,28 @@ fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
     let body = |id: &usize| *id < design.bodies.len();
     let joints = design.joints.iter().all(|j| j.bodies.len() > 1 && j.bodies.iter().all(body));
     let drives = design.drives.iter().all(|d| d.joint < design.joints.len());
-    let traces = design.traces.iter().all(|t| body(&t.body));
-    let moving = design.bodies.iter().filter(|b| !b.ground).count();
+    let aims = &design.aims;
+    let traces = design.traces.iter().all(|t| body(&t.body))
+        && aims.directions.iter().all(|d| body(&d.body))
+        && aims.angles.iter().all(|a| body(&a.body));
+    let loads = design.loads.iter().all(|l| match &l.kind {
+        LoadKind::Force { body: b, .. } | LoadKind::Moment { body: b, .. } => body(b),
+        LoadKind::Gravity { .. } => true,
+    });
+    let moving = design.bodies.iter().filter(|b| !b.ground && b.owner.is_none()).count();
     let steps = design.cycle.steps;
+    let values = if p.len() == design.free.len() { design.exprs.values(p) } else { Vec::new() };
     let bounded = |d: &Drive| {
         let most = match d.unit {
             DriveUnit::Rad => MAX_DRIVE_RAD,
             DriveUnit::Mm => MAX_DRIVE_MM,
         };
-        d.rest.abs() <= most && (0..=steps).all(|i| d.value(i as f64 / steps as f64).abs() <= most)
+        d.rest_value(&values).abs() <= most
+            && (0..=steps).all(|i| d.value(i as f64 / steps as f64).abs() <= most)
     };
     let problem = if p.len() != design.free.len() {
         "the number of free values is not the design's"
-    } else if !(joints && drives && traces) {
+    } else if !(joints && drives && traces && loads) {
         "the design refers to bodies or joints it does not have"
     } else if moving == 0 {
         "the mechanism has no link that could move"
@@ -210,6 +248,13 @@ fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
                 drive.origin,
             )
             .help("a drive turns at most 100 times, or slides at most 10 m, in a cycle"),
+        ]);
+    } else if let Some(load) =
+        design.loads.iter().find(|l| (0..=steps).any(|i| !l.size(i as f64 / steps as f64).is_finite()))
+    {
+        return Err(vec![
+            Diagnostic::error("E0500", "a load has no size somewhere in the cycle", load.origin)
+                .help("t runs from 0 to 1: divide by nothing that is zero in between"),
         ]);
     } else if work(design, moving) > MAX_WORK {
         "the drives go too far for so many links"

@@ -153,7 +153,7 @@ impl Ranks {
 }
 
 /// Bodies with a share in the null motions.
-fn loose(mechanism: &Mechanism, held: &Rank) -> Vec<usize> {
+pub(super) fn loose(mechanism: &Mechanism, held: &Rank) -> Vec<usize> {
     let share =
         |column: &usize| held.null.iter().map(|v| v.rows(*column, 6).norm_squared()).sum::<f64>().sqrt();
     let shares: Vec<f64> = mechanism.column.iter().map(|c| c.as_ref().map_or(0.0, share)).collect();

@@ -1,5 +1,7 @@
 //! The conventional mechanism: constraints, assembly, mobility, motion.
 
+mod carried;
+mod change;
 pub mod constraint;
 #[cfg(test)]
 mod derivative_tests;
@@ -10,8 +12,11 @@ pub mod mechanism;
 pub mod mobility;
 pub mod motion;
 mod path;
+mod standing;
 pub mod value;
 
+pub use carried::{ReferenceChange, Twist};
+pub use change::{MotionChange, motion_changes};
 pub use constraint::{Constraint, GeometryChange, Jacobian};
 pub use idle::Idle;
 pub use linear::RANK_TOLERANCE;

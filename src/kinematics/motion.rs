@@ -1,9 +1,11 @@
 //! Motion of the conventional mechanism over the cycle of its drives: poses, joint angles and traces at every
 //! state, the rest pose, and the findings of a designer's first look (does it close, what turns fully).
 
+use super::idle::unturn;
 use super::mechanism::Mechanism;
 use super::mobility::{Mobility, names};
 use super::path::{Branch, Sample, Stuck};
+use super::standing;
 use crate::diagnostic::Diagnostic;
 use crate::ir::{BodyId, Design, DriveUnit, JointId, JointKind};
 use crate::math::Pose;
@@ -29,6 +31,8 @@ pub struct State {
     pub joint_values: Vec<f64>,
     /// Position of every trace, mm.
     pub traces_mm: Vec<Vector3<f64>>,
+    /// How far every body whose angle is asked for has turned from the drawing pose, unwrapped, rad.
+    pub angles_rad: Vec<f64>,
 }
 
 /// Solved motion.
@@ -102,6 +106,9 @@ impl Motion {
 pub fn solve_motion(design: &Design, p: &[f64]) -> Result<Motion, Vec<Diagnostic>> {
     let mechanism = Mechanism::new(design, p)?;
     let mobility = Mobility::of(&mechanism);
+    if !design.is_driven() && !design.loads.is_empty() {
+        return standing(&mechanism, mobility);
+    }
     if let Some(found) = mobility.diagnose(&mechanism) {
         return Err(vec![found]);
     }
@@ -113,8 +120,12 @@ pub fn solve_motion(design: &Design, p: &[f64]) -> Result<Motion, Vec<Diagnostic
     else {
         return Err(vec![drawn_at_dead_point(design)]);
     };
-    let rest: Vec<f64> = design.drives.iter().map(|d| d.rest).collect();
-    let rest = to_rest.advance(&rest).map_err(|stuck| vec![cannot_close(design, &stuck, Some(&rest))])?;
+    let values = design.exprs.values(p);
+    let rest: Vec<f64> = design.drives.iter().map(|d| d.rest_value(&values)).collect();
+    let mut rest = to_rest.advance(&rest).map_err(|stuck| vec![cannot_close(design, &stuck, Some(&rest))])?;
+    if let Some(poses) = unturn(&mechanism, &rest.poses, &rest.drive) {
+        rest.poses = poses;
+    }
     let mut states = Vec::with_capacity(steps + 1);
     for target in targets {
         let sample = cycle.advance(&target).map_err(|stuck| vec![cannot_close(design, &stuck, None)])?;
@@ -141,8 +152,22 @@ pub fn solve_motion(design: &Design, p: &[f64]) -> Result<Motion, Vec<Diagnostic
     if turning.is_empty() { Ok(motion) } else { Err(turning) }
 }
 
-fn state(mechanism: &Mechanism, sample: Sample) -> State {
+/// Without a drive every state is the drawing.
+fn standing(mechanism: &Mechanism, mobility: Mobility) -> Result<Motion, Vec<Diagnostic>> {
+    if let Some(found) = standing::diagnose(mechanism) {
+        return Err(vec![found]);
+    }
+    let rest = standing::drawn(mechanism);
+    let states = vec![rest.clone(); mechanism.design.cycle.steps + 1];
+    let warnings = mobility.advice(mechanism).into_iter().collect();
+    Ok(Motion { mobility, joint_points: mechanism.joint_points.clone(), rest, states, warnings })
+}
+
+fn state(mechanism: &Mechanism, mut sample: Sample) -> State {
+    mechanism.carry(&mut sample.poses);
+    let angles_rad = sample.values.split_off(mechanism.values.len());
     State {
+        angles_rad,
         traces_mm: mechanism.trace_points(&sample.poses),
         drives: sample.drive,
         poses: sample.poses,

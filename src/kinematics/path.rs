@@ -25,7 +25,7 @@ const MAX_CORRECTION: f64 = 0.1;
 const MAX_TURN: f64 = 0.5;
 /// Least pivot (square of the least singular value, about) of a pose that counts as a dead point. Measured: 2e-3 to
 /// 4e-2 over the cycles of the test mechanisms, 3e-9 at 1e-4 rad beside the change point of a parallelogram.
-const DEAD_POINT: f64 = 1e-9;
+pub(super) const DEAD_POINT: f64 = 1e-9;
 /// A change point is reported once it is known to this, rad: 0.05°.
 const CHANGE_POINT_RAD: f64 = 1e-3;
 /// Attempts on the way to one target. Usual are one to five, near the end of a range a hundred.
@@ -36,8 +36,8 @@ const BRIDGE_RAD: f64 = 1e-3;
 /// A closed pose and the linearisation there.
 pub(super) struct Corrected {
     pub poses: Vec<Pose>,
-    rows: Rows,
-    factor: Factor,
+    pub rows: Rows,
+    pub factor: Factor,
     /// Length of the scaled way from the start.
     travel: f64,
 }
@@ -116,7 +116,7 @@ impl<'m, 'd> Branch<'m, 'd> {
         if at.factor.least_pivot < DEAD_POINT {
             return None;
         }
-        let values = vec![0.0; mechanism.values.len()];
+        let values = vec![0.0; mechanism.value_count()];
         Some(Self {
             mechanism,
             scales: mechanism.drives.iter().map(|d| mechanism.drive_scale(d)).collect(),

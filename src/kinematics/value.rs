@@ -32,6 +32,23 @@ impl JointValue {
         }
     }
 
+    /// The same value with another reference pose, to which `rest` leads the first body: zero there.
+    pub fn carried(&self, rest: &Pose) -> Self {
+        match self {
+            Self::Angle(angle) => Self::Angle(HingeAngle {
+                axis: rest.direction(&angle.axis),
+                normal: rest.direction(&angle.normal),
+                binormal: rest.direction(&angle.binormal),
+                ..*angle
+            }),
+            Self::Shift(shift) => Self::Shift(Shift {
+                axis: rest.direction(&shift.axis),
+                point: rest.point(&shift.point),
+                ..*shift
+            }),
+        }
+    }
+
     /// First and second body.
     pub fn bodies(&self) -> [usize; 2] {
         match self {

@@ -2,6 +2,7 @@
 //! the solvers (Megaro et al. 2017, section 4). The only client of argmin.
 
 mod box_qp;
+mod cma_es;
 mod guards;
 mod lbfgs;
 mod levenberg;

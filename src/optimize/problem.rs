@@ -5,23 +5,31 @@ use super::guards;
 use super::normal::Normal;
 use super::objectives::{self, Level, StateView, StatesSensitivity, Term};
 use crate::equilibrium::{
-    Cycle, Equilibrium, Layout, Model, PointForce, SensitivityWorkspace, Solver, sweep,
+    Cycle, Equilibrium, Layout, Model, PointForce, PointForceChange, SensitivityWorkspace, Solver, sweep,
 };
+use crate::geometry::{SkeletonCapsule, parts_input, plan_bodies, skeleton_capsules};
 use crate::ir::Design;
+use crate::kinematics::solve_motion;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A design, its layout and its objective.
 pub struct Problem<'d> {
     design: &'d Design,
+    /// Of the start; the only one where no free variable moves the geometry.
     layout: &'d Layout,
+    /// Whether one does.
+    moving: bool,
     objectives: Vec<Term>,
-    /// Per load case one force a state.
+    /// Per load case one force a state, in that layout.
     cases: Vec<Vec<PointForce>>,
     /// Largest sample of each soft maximum at the first point simulated: what its sharpness refers to.
     references: OnceLock<Vec<f64>>,
     edges: usize,
+    /// Whether a term sees the links' shapes.
+    needs_links: bool,
     simulations: AtomicUsize,
 }
 
@@ -39,6 +47,10 @@ pub struct Trial<'d> {
     pub terms: Vec<f64>,
     /// Of each term that is a soft maximum.
     levels: Vec<Option<Level>>,
+    /// Per load case one force a state.
+    cases: Vec<Vec<PointForce>>,
+    /// The links' shapes; empty where no term sees them.
+    capsules: Vec<SkeletonCapsule>,
     /// Per counted state its equilibria under the load cases; empty without load cases.
     loaded: Vec<Vec<Equilibrium>>,
 }
@@ -49,13 +61,15 @@ impl Trial<'_> {
         self.cycle.states.iter().map(|s| s.max_stress_mpa(&self.model)).fold(0.0, f64::max)
     }
 
-    /// Largest distance of any trace from its target, mm; none without a trace.
+    /// Largest distance of any trace from its target, mm: from the place of the same time, or where it is tracked
+    /// by form only, from the nearest one. None without a trace or a target.
     pub fn max_error_mm(&self) -> Option<f64> {
-        let layout = self.model.layout;
+        let layout = &self.model.layout;
         let mut largest = None;
-        for trace in &layout.traces {
+        for trace in layout.traces.iter().filter(|t| t.has_target) {
             for (state, target) in self.cycle.states.iter().zip(&trace.target) {
                 let z = state.state.poses[trace.body].point(&trace.rest);
+                let target = if trace.has_no_phase { trace.nearest(&z).place } else { *target };
                 largest = Some((z - target).norm().max(largest.unwrap_or(0.0)));
             }
         }
@@ -89,10 +103,12 @@ impl<'d> Problem<'d> {
         Self {
             design,
             layout,
+            moving: !design.geometry_variables().is_empty(),
             objectives,
             cases,
             references: OnceLock::new(),
             edges,
+            needs_links: objectives::needs_links(design),
             simulations: AtomicUsize::new(0),
         }
     }
@@ -141,11 +157,18 @@ impl<'d> Problem<'d> {
     pub fn simulate(&self, x: &[f64]) -> Option<Trial<'d>> {
         self.simulations.fetch_add(1, Ordering::Relaxed);
         let p = self.to_parameters(x);
-        let model = Model::new(self.design, self.layout, &p, self.edges, true).ok()?;
+        let layout = self.layout_at(&p)?;
+        let cases = match &layout {
+            Cow::Borrowed(_) => self.cases.clone(),
+            Cow::Owned(layout) => objectives::build(self.design, layout).1,
+        };
+        let model = Model::new(self.design, layout, &p, self.edges, true).ok()?;
         let cycle = sweep(&model).ok()?;
-        let loaded = self.load(&model, &cycle)?;
-        let views: Vec<StateView> =
-            (0..self.layout.counted_states()).map(|s| self.view(&model, &cycle, &loaded, s)).collect();
+        let loaded = self.load(&model, &cycle, &cases)?;
+        let capsules = self.links(&model, p.len())?;
+        let views: Vec<StateView> = (0..self.layout.counted_states())
+            .map(|s| self.view(&model, &cycle, &loaded, &capsules, s))
+            .collect();
         let references = self.references.get_or_init(|| {
             let largest = |o: &Term| match o {
                 Term::Sum(_) => 0.0,
@@ -171,12 +194,39 @@ impl<'d> Problem<'d> {
         drop(views);
         terms.push(guards::cost(&model));
         let cost: f64 = terms.iter().sum();
-        cost.is_finite().then(|| Trial { x: x.to_vec(), model, cycle, cost, terms, levels, loaded })
+        let made = Trial { x: x.to_vec(), model, cycle, cost, terms, levels, cases, capsules, loaded };
+        cost.is_finite().then_some(made)
+    }
+
+    /// The layout at parameters `p`: followed anew from the drawing where they move the geometry, always on the way of
+    /// assembly that is drawn; none where that cannot be assembled.
+    fn layout_at(&self, p: &[f64]) -> Option<Cow<'d, Layout>> {
+        if !self.moving {
+            return Some(Cow::Borrowed(self.layout));
+        }
+        let motion = solve_motion(self.design, p).ok()?;
+        let mut layout = Layout::new(self.design, &motion, p);
+        layout.rod_model = self.layout.rod_model;
+        Some(Cow::Owned(layout))
+    }
+
+    /// The links' shapes, where a term sees them; none where a link has none.
+    fn links(&self, model: &Model<'d>, parameters: usize) -> Option<Vec<SkeletonCapsule>> {
+        if !self.needs_links {
+            return Some(Vec::new());
+        }
+        let plans = plan_bodies(&parts_input(self.design, &model.layout, model)).ok()?;
+        Some(skeleton_capsules(&plans, model, parameters))
     }
 
     /// Equilibria under the load cases; none where one cannot be found.
-    fn load(&self, model: &Model<'d>, cycle: &Cycle) -> Option<Vec<Vec<Equilibrium>>> {
-        if self.cases.is_empty() {
+    fn load(
+        &self,
+        model: &Model<'d>,
+        cycle: &Cycle,
+        cases: &[Vec<PointForce>],
+    ) -> Option<Vec<Vec<Equilibrium>>> {
+        if cases.is_empty() {
             return Some(Vec::new());
         }
         (0..self.layout.counted_states())
@@ -184,19 +234,14 @@ impl<'d> Problem<'d> {
             .map_init(
                 || Solver::new(model),
                 |solver, s| {
-                    let target = self.target(s);
+                    let target = target(model, s);
                     let load = |case: &Vec<PointForce>| {
                         solver.load(model, &cycle.states[s], &target, case.get(s..=s)?).ok()
                     };
-                    self.cases.iter().map(load).collect()
+                    cases.iter().map(load).collect()
                 },
             )
             .collect()
-    }
-
-    /// Drive values of a state relative to rest, rad.
-    fn target(&self, state: usize) -> Vec<f64> {
-        self.layout.drives.iter().map(|d| d.values[state] - d.rest).collect()
     }
 
     fn view<'a>(
@@ -204,6 +249,7 @@ impl<'d> Problem<'d> {
         model: &'a Model<'d>,
         cycle: &'a Cycle,
         loaded: &'a [Vec<Equilibrium>],
+        capsules: &'a [SkeletonCapsule],
         state: usize,
     ) -> StateView<'a> {
         StateView {
@@ -212,6 +258,7 @@ impl<'d> Problem<'d> {
             loaded: loaded.get(state).map_or(&[], |l| l),
             state,
             share: objectives::STEPS_OF_WEIGHTS / self.layout.counted_states() as f64,
+            capsules,
         }
     }
 
@@ -220,19 +267,25 @@ impl<'d> Problem<'d> {
     /// result does not depend on the number of threads.
     pub fn differentiate(&self, trial: &Trial<'d>) -> Option<Derivatives> {
         let n = self.parameters();
+        let changes = objectives::load_changes(self.design, &trial.model.layout);
         let parts: Vec<Option<Vec<Normal>>> = (0..self.layout.counted_states())
             .into_par_iter()
             .map_init(
-                || SensitivityWorkspace::new(&trial.model),
+                || SensitivityWorkspace::new(&trial.model).with_centrelines(self.needs_links),
                 |workspace, s| {
-                    let target = self.target(s);
-                    let view = self.view(&trial.model, &trial.cycle, &trial.loaded, s);
+                    let target = target(&trial.model, s);
+                    let view = self.view(&trial.model, &trial.cycle, &trial.loaded, &trial.capsules, s);
                     let free = workspace.at(&trial.model, view.equilibrium, &target).ok()?;
-                    let loaded = self
+                    let loaded = trial
                         .cases
                         .iter()
                         .zip(view.loaded)
-                        .map(|(case, e)| workspace.at_loaded(&trial.model, e, &target, case.get(s..=s)?).ok())
+                        .enumerate()
+                        .map(|(k, (case, e))| {
+                            let of_state = |c: &Vec<PointForceChange>| c.get(s..=s).map(<[_]>::to_vec);
+                            let moved: Vec<_> = changes.get(k)?.iter().filter_map(of_state).collect();
+                            workspace.at_moving(&trial.model, e, &target, case.get(s..=s)?, &moved).ok()
+                        })
                         .collect::<Option<Vec<_>>>()?;
                     Some(self.state_parts(trial, &view, &StatesSensitivity { free, loaded }))
                 },
@@ -286,4 +339,9 @@ impl<'d> Problem<'d> {
         }
         parts
     }
+}
+
+/// Drive values of a state relative to rest, rad or mm, and the sizes of its loads.
+fn target(model: &Model, state: usize) -> Vec<f64> {
+    model.layout.controls(state)
 }

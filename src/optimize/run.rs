@@ -1,6 +1,7 @@
 //! One optimisation run: argmin's executor around the chosen solver, progress, interruption, and the
 //! best point kept whatever happens.
 
+use super::cma_es::cma_es;
 use super::lbfgs::Unbounded;
 use super::levenberg::LevenbergMarquardt;
 use super::problem::Problem;
@@ -20,6 +21,8 @@ pub enum Method {
     LevenbergMarquardt,
     /// L-BFGS on sine-transformed variables.
     Lbfgs,
+    /// CMA-ES, without derivatives.
+    CmaEs,
 }
 
 /// How a run ended.
@@ -66,6 +69,7 @@ pub fn optimize<'d>(
     let (iterations, ending) = match method {
         Method::LevenbergMarquardt => levenberg_marquardt(&shared, x, limit),
         Method::Lbfgs => lbfgs(&shared, &x, limit),
+        Method::CmaEs => cma_es(&shared, &x, limit),
     };
     let best = shared.best();
     let simulations = shared.problem.simulations();

@@ -40,6 +40,11 @@ impl<'d> Shared<'d> {
         self.best.lock().ok().and_then(|b| b.clone())
     }
 
+    /// Set when the user asks to stop.
+    pub fn stop(&self) -> &'d AtomicBool {
+        self.cancel
+    }
+
     /// Whether the user asked to stop.
     pub fn cancelled(&self) -> bool {
         self.cancel.load(Ordering::Relaxed)

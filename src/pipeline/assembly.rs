@@ -1,5 +1,6 @@
 //! From the simulated designs to what their instances do in the assembly: places, states, common motors.
 
+use super::aims::AimSeries;
 use super::measure::{check_requirement, check_requirements, is_closed, measure};
 use super::report::{Measures, RequirementResult};
 use super::stages::Simulation;
@@ -16,8 +17,8 @@ pub fn place(assembly: &Assembly, designs: &[Simulation]) -> Vec<Simulation> {
     if assembly.single().is_some() {
         return designs.to_vec();
     }
-    let pairs = assembly.placed().filter_map(|(i, _)| Some((i, designs.get(i.design)?)));
-    let mut placed: Vec<Simulation> = pairs.map(|(i, s)| placed_simulation(i, s)).collect();
+    let pairs = assembly.placed().filter_map(|(i, d)| Some((i, d, designs.get(i.design)?)));
+    let mut placed: Vec<Simulation> = pairs.map(|(i, d, s)| placed_simulation(i, d, s)).collect();
     for motor in 0..assembly.motors.len() {
         let members: Vec<(usize, usize, f64)> = assembly.members(motor).collect();
         if members.len() < 2 {
@@ -41,22 +42,54 @@ pub fn place(assembly: &Assembly, designs: &[Simulation]) -> Vec<Simulation> {
     placed
 }
 
-fn placed_simulation(instance: &Instance, simulation: &Simulation) -> Simulation {
+fn placed_simulation(instance: &Instance, design: &Design, simulation: &Simulation) -> Simulation {
     let table = &simulation.motion;
     let order = |n: usize| (0..n).map(|s| instance.state(s));
     let states = order(table.states.len()).filter_map(|s| table.states.get(s));
     let series = |values: &[f64]| order(values.len()).filter_map(|s| values.get(s).copied()).collect();
+    let aims = placed_aims(instance, &simulation.aims);
     Simulation {
         motion: MotionTable {
             drives: table.drives.iter().map(|(n, unit)| (instance.of(n), *unit)).collect(),
             traces: table.traces.iter().map(|n| instance.of(n)).collect(),
             bodies: table.bodies.iter().map(|n| instance.of(n)).collect(),
             has_forces: table.has_forces,
+            has_loads: table.has_loads,
+            more: aims.columns(design).into_iter().map(|(n, v)| (column(instance, &n), v)).collect(),
             states: states.map(|s| placed_state(instance, s)).collect(),
         },
         errors_mm: simulation.errors_mm.iter().map(|e| series(e)).collect(),
         gaps_mm: series(&simulation.gaps_mm),
+        aims,
         diagnostics: Vec::new(),
+    }
+}
+
+/// `output.curl_deg` of `index` is `output.index.curl_deg`.
+fn column(instance: &Instance, name: &str) -> String {
+    match name.split_once('.') {
+        Some((what, name)) => format!("{what}.{}", instance.of(name)),
+        None => instance.of(name),
+    }
+}
+
+/// Directions turn with the instance; angles are about the image of their axis.
+fn placed_aims(instance: &Instance, aims: &AimSeries) -> AimSeries {
+    fn order<T: Clone>(instance: &Instance, values: &[T]) -> Vec<T> {
+        (0..values.len()).filter_map(|s| values.get(instance.state(s)).cloned()).collect()
+    }
+    let all = |lists: &[Vec<f64>]| lists.iter().map(|v| order(instance, v)).collect();
+    let p = &instance.placement;
+    let turned = |d: [f64; 3]| p.direction(&Vector3::from(d)).into();
+    let directions = aims.directions.iter().map(|v| order(instance, v).into_iter().map(turned).collect());
+    let angles = aims.angles_rad.iter();
+    AimSeries {
+        closest_mm: all(&aims.closest_mm),
+        aim_errors_rad: all(&aims.aim_errors_rad),
+        directions: directions.collect(),
+        angles_rad: angles
+            .map(|v| order(instance, v).into_iter().map(|a| a * p.handedness()).collect())
+            .collect(),
     }
 }
 
@@ -71,6 +104,7 @@ fn placed_state(instance: &Instance, state: &MotionState) -> MotionState {
         traces_mm: state.traces_mm.iter().map(|t| p.point(&Vector3::from(*t)).into()).collect(),
         drive_loads: signed(&state.drive_loads),
         energy_n_mm: state.energy_n_mm,
+        load_potential_n_mm: state.load_potential_n_mm,
         stress_max_mpa: state.stress_max_mpa,
         poses: state.poses.iter().map(|pose| placed_pose(p, pose)).collect(),
     }
@@ -120,6 +154,8 @@ pub fn combine(assembly: &Assembly, placed: Vec<Simulation>) -> Simulation {
         out.motion.drives.extend(kept(&table.drives, &drives));
         out.motion.traces.extend(table.traces.iter().cloned());
         out.motion.bodies.extend(kept(&table.bodies, &bodies));
+        out.motion.more.extend(table.more.iter().cloned());
+        out.motion.has_loads |= table.has_loads;
         out.errors_mm.extend(p.errors_mm.iter().cloned());
         for (sum, s) in out.motion.states.iter_mut().zip(&table.states) {
             sum.drives.extend(kept(&s.drives, &drives));
@@ -127,6 +163,7 @@ pub fn combine(assembly: &Assembly, placed: Vec<Simulation>) -> Simulation {
             sum.traces_mm.extend(s.traces_mm.iter().copied());
             sum.poses.extend(kept(&s.poses, &bodies));
             sum.energy_n_mm += s.energy_n_mm;
+            sum.load_potential_n_mm += s.load_potential_n_mm;
             sum.stress_max_mpa = sum.stress_max_mpa.max(s.stress_max_mpa);
         }
         match out.gaps_mm.is_empty() {
@@ -146,6 +183,8 @@ pub fn measure_all(assembly: &Assembly, placed: &[Simulation]) -> Measures {
     let mut all = Measures::default();
     for (i, ((instance, design), simulation)) in assembly.placed().zip(placed).enumerate() {
         let own = measure(design, simulation);
+        all.directions.extend(own.directions.into_iter().map(|(n, d)| (instance.of(&n), d)));
+        all.outputs.extend(own.outputs.into_iter().map(|(n, o)| (instance.of(&n), o)));
         all.traces.extend(own.traces.into_iter().map(|(n, t)| (instance.of(&n), t)));
         for (k, drive) in design.drives.iter().enumerate() {
             let motor = instance.drives.get(k).and_then(|d| assembly.motors.get(d.motor));
@@ -203,8 +242,7 @@ pub fn driven(assembly: &Assembly, export: &AssemblyExport, drive: usize) -> Opt
         design.name = format!("{}_{}", assembly.name, instance.name);
         if instance.drives.get(drive)?.sign < 0.0 {
             let turned = design.drives.get_mut(drive)?;
-            turned.profile = turned.profile.reversed();
-            turned.rest = -turned.rest;
+            turned.reverse(&mut design.exprs);
         }
     }
     Some((design, drive))

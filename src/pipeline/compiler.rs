@@ -1,6 +1,7 @@
 //! The real stages: the only place where the pipeline touches elaboration, kinematics, equilibrium,
 //! optimisation and geometry.
 
+use super::aims::AimSeries;
 use super::joined::{self, Solid};
 use super::progress::Iteration;
 use super::report::Artefact;
@@ -11,6 +12,7 @@ use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
 use crate::emit::stl::stl_bytes;
 use crate::equilibrium::{Cycle, Layout, Model, ModelError, SweepError, sweep};
+use crate::geometry::parts_input;
 use crate::ir::{Assembly, Design, ObjectiveKind, Solution};
 use crate::kinematics::{Constraint, Motion, solve_motion};
 use crate::math::{Pose, log_so3};
@@ -53,8 +55,8 @@ impl Stages for Compiler {
         Checked { sources: out.sources, assembly: out.assembly, diagnostics: out.diagnostics }
     }
 
-    fn rigid(&self, design: &Design) -> Result<Simulation, Failed> {
-        let motion = solve_motion(design, &starts(design))?;
+    fn rigid(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
+        let motion = solve_motion(design, values)?;
         let states = motion
             .states
             .iter()
@@ -65,8 +67,10 @@ impl Stages for Compiler {
                 ..MotionState::default()
             })
             .collect();
+        let aims = AimSeries::conventional(design, &motion);
         Ok(Simulation {
-            motion: table(design, false, states),
+            motion: MotionTable { more: aims.columns(design), ..table(design, false, states) },
+            aims,
             diagnostics: motion.warnings,
             ..Simulation::default()
         })
@@ -81,25 +85,31 @@ impl Stages for Compiler {
             traces_mm: layout.traces.iter().map(|t| e.state.poses[t.body].point(&t.rest).into()).collect(),
             drive_loads: (0..layout.drives.len()).map(|d| e.drive_load(&model, d)).collect(),
             energy_n_mm: e.energy_n_mm,
+            load_potential_n_mm: e.load_potential_n_mm,
             stress_max_mpa: e.max_stress_mpa(&model),
             poses: moving(design, |b| from_rest(&e.state.poses[b])),
         });
         let errors_mm = layout
             .traces
             .iter()
-            .map(|t| {
+            .enumerate()
+            .map(|(i, t)| {
                 let distance = |(e, target): (&crate::equilibrium::Equilibrium, &Vector3<f64>)| {
                     (e.state.poses[t.body].point(&t.rest) - target).norm()
                 };
-                cycle.states.iter().zip(&t.target).map(distance).collect()
+                // Without a drive the conventional mechanism stands still: that is no target.
+                let states = if design.has_target(i) { cycle.states.as_slice() } else { &[] };
+                states.iter().zip(&t.target).map(distance).collect()
             })
             .collect();
         let mut diagnostics = judge(design, &layout, &cycle);
-        let gaps = solids::gaps(design, &layout, &motion, &model, &cycle);
+        let (gaps, carving) = solids::gaps(design, &layout, &model, &cycle);
+        diagnostics.extend(solids::not_carved(design, &carving));
         diagnostics.extend(solids::collisions(design, &gaps));
         let gaps_mm = gaps.least.iter().filter_map(|g| g.map(|g| g.gap_mm)).collect();
-        let motion = table(design, true, states.collect());
-        Ok(Simulation { motion, errors_mm, gaps_mm, diagnostics })
+        let aims = AimSeries::compliant(design, &layout, &motion, &cycle);
+        let motion = MotionTable { more: aims.columns(design), ..table(design, true, states.collect()) };
+        Ok(Simulation { motion, errors_mm, aims, gaps_mm, diagnostics })
     }
 
     fn optimize(
@@ -110,6 +120,21 @@ impl Stages for Compiler {
         cancel: &AtomicBool,
     ) -> Result<Solved, Failed> {
         let (layout, _) = layout(design, start)?;
+        if layout.changes.is_none() {
+            return Err(vec![dead_point(design)]);
+        }
+        if let Some(term) =
+            design.objectives.iter().find(|o| matches!(o.kind, ObjectiveKind::Collision { .. }))
+        {
+            let asks = |d: Diagnostic| {
+                d.also(term.origin, "this term sees the printed form").help(
+                    "without `collision` and `export stl` the mechanism can be checked, simulated and solved",
+                )
+            };
+            solids::available(design)
+                .map_err(|found| found.into_iter().map(asks).collect::<Vec<Diagnostic>>())?;
+            solids::plannable(design, &layout, start, EDGES)?;
+        }
         let problem = Problem::new(design, &layout, EDGES);
         let names = problem.term_names();
         let told = |i: &optimize::Iteration| {
@@ -126,7 +151,10 @@ impl Stages for Compiler {
             // Say why, by simulating the start once more.
             self.simulate(design, start)?;
             let message = "the optimiser has nowhere to begin: an objective cannot be computed at the start";
-            let loaded = design.objectives.iter().find(|o| matches!(o.kind, ObjectiveKind::Sway { .. }));
+            let loaded = design
+                .objectives
+                .iter()
+                .find(|o| matches!(o.kind, ObjectiveKind::Sway { .. } | ObjectiveKind::SwayAlong { .. }));
             let at = loaded.map_or(design.origin, |o| o.origin);
             return Err(vec![
                 Diagnostic::error("E0611", message, at)
@@ -162,12 +190,16 @@ impl Stages for Compiler {
         let mut built = Vec::new();
         for (design, values) in assembly.designs.iter().zip(values) {
             solids::available(design)?;
-            let (layout, motion) = layout(design, values)?;
+            let (layout, _) = layout(design, values)?;
             let model =
                 Model::new(design, &layout, values, MESH_EDGES, false).map_err(|e| no_rod(design, &e))?;
-            let (parts, findings) = solids::build(design, &layout, &motion, &model)?;
+            // What flexures sweep over the cycle is taken out of their own links.
+            let solved = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
+            let cycle = sweep(&solved).map_err(|e| lost(design, &e))?;
+            let states = solids::states(design, &layout, &solved, &cycle);
+            let (parts, findings) = solids::build(design, &layout, &model, &states)?;
             found.extend(findings);
-            built.push(Solid { input: solids::parts_input(design, &layout, &motion, &model), parts });
+            built.push(Solid { input: parts_input(design, &layout, &model), parts });
         }
         let (parts, findings) = joined::parts(assembly, &built)?;
         found.extend(findings);
@@ -182,14 +214,20 @@ impl Stages for Compiler {
     }
 }
 
-/// Conventional motion and layout. The free variables reach flexures only, so any values do.
+/// Conventional motion and layout.
 pub(super) fn layout(design: &Design, values: &[f64]) -> Result<(Layout, Motion), Failed> {
     let motion = solve_motion(design, values)?;
     Ok((Layout::new(design, &motion, values), motion))
 }
 
-fn starts(design: &Design) -> Vec<f64> {
-    design.free.iter().map(|f| f.start).collect()
+/// The geometry is to vary, but the conventional motion cannot be differentiated at the start.
+fn dead_point(design: &Design) -> Diagnostic {
+    let moving = design.geometry_variables();
+    let first = moving.first().and_then(|i| design.free.get(*i));
+    let message = "points cannot be free in a cycle that stops exactly at a dead point";
+    Diagnostic::error("E0612", message, first.map_or(design.origin, |f| f.origin))
+        .label("this moves points of the mechanism, or its rest pose")
+        .help("shift the drive's range a little, take another number of steps, or write a number here")
 }
 
 fn table(design: &Design, has_forces: bool, states: Vec<MotionState>) -> MotionTable {
@@ -198,7 +236,9 @@ fn table(design: &Design, has_forces: bool, states: Vec<MotionState>) -> MotionT
         traces: design.traces.iter().map(|t| t.name.clone()).collect(),
         bodies: design.bodies.iter().filter(|b| !b.ground).map(|b| b.name.clone()).collect(),
         has_forces,
+        has_loads: !design.loads.is_empty(),
         states,
+        ..MotionTable::default()
     }
 }
 
@@ -237,8 +277,15 @@ fn lost(design: &Design, error: &SweepError) -> Failed {
         .zip(&error.last_drives)
         .map(|(d, v)| format!("{} = {}", d.name, d.unit.show(*v)))
         .collect();
-    let at = design.drives.first().map_or(design.origin, |d| d.origin);
     let message = format!("the mechanism cannot be followed to state {}", error.state);
+    if let ([], Some(load)) = (design.drives.as_slice(), design.loads.first()) {
+        return vec![
+            Diagnostic::error("E0602", message, load.origin)
+                .label("no equilibrium under this load")
+                .help("the flexures bear less than that: thicken them, or make the load smaller"),
+        ];
+    }
+    let at = design.drives.first().map_or(design.origin, |d| d.origin);
     vec![
         Diagnostic::error("E0602", message, at)
             .label(format!("last equilibrium at {}", values.join(", ")))

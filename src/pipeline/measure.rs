@@ -11,7 +11,8 @@ pub fn measure(design: &Design, simulation: &Simulation) -> Measures {
     let table = &simulation.motion;
     let mut measures = Measures::default();
     for (i, trace) in design.traces.iter().enumerate() {
-        let errors = series(simulation, &Quantity::Error(i));
+        let quantity = if design.has_no_phase(i) { Quantity::ErrorClosest } else { Quantity::Error };
+        let errors = series(simulation, &quantity(i));
         let path: Vec<[f64; 3]> = table.states.iter().filter_map(|s| s.traces_mm.get(i).copied()).collect();
         measures.traces.insert(
             trace.name.clone(),
@@ -22,6 +23,8 @@ pub fn measure(design: &Design, simulation: &Simulation) -> Measures {
             },
         );
     }
+    measures.directions = simulation.aims.measure_directions(design, closed);
+    measures.outputs = simulation.aims.measure_outputs(design, closed);
     for (i, drive) in design.drives.iter().enumerate() {
         let loads = series(simulation, &Quantity::Torque(i));
         let largest = aggregate(&loads, Aggregate::Max, closed).unwrap_or(f64::NAN);
@@ -38,9 +41,9 @@ pub fn measure(design: &Design, simulation: &Simulation) -> Measures {
     measures
 }
 
-/// Whether every drive is in the same pose at both ends of the cycle.
+/// Whether the mechanism is in the same pose at both ends of the cycle.
 pub fn is_closed(design: &Design) -> bool {
-    design.drives.iter().all(|d| d.is_closed())
+    design.is_closed()
 }
 
 /// Checks every `require` line; one that fails is also a diagnostic at its line.
@@ -60,6 +63,8 @@ pub(super) fn check_requirement(
 ) -> RequirementResult {
     let value = aggregate(&series(simulation, &requirement.quantity), requirement.aggregate, closed);
     let unit = unit(&requirement.quantity);
+    // Angles are told in degrees.
+    let shown = |v: f64| if unit == "deg" { v.to_degrees() } else { v };
     let bound = requirement.bound;
     let pass = value.is_some_and(|v| match (requirement.at_most, requirement.strict) {
         (true, false) => v <= bound,
@@ -69,13 +74,22 @@ pub(super) fn check_requirement(
     });
     if !pass {
         let label = match value {
-            Some(v) => format!("measured {v:.4} {unit}, required {} {bound:.4} {unit}", sign(requirement)),
+            Some(v) => {
+                let (v, bound) = (shown(v), shown(bound));
+                format!("measured {v:.4} {unit}, required {} {bound:.4} {unit}", sign(requirement))
+            }
             None => "could not be measured".into(),
         };
         let message = format!("a requirement fails: {}", requirement.text);
         found.push(Diagnostic::error("E0801", message, requirement.origin).label(label));
     }
-    RequirementResult { text: requirement.text.clone(), value, unit, bound, pass }
+    RequirementResult {
+        text: requirement.text.clone(),
+        value: value.map(shown),
+        unit,
+        bound: shown(bound),
+        pass,
+    }
 }
 
 fn sign(requirement: &Requirement) -> &'static str {
@@ -89,7 +103,8 @@ fn sign(requirement: &Requirement) -> &'static str {
 
 fn unit(quantity: &Quantity) -> &'static str {
     match quantity {
-        Quantity::Error(_) | Quantity::Gap => "mm",
+        Quantity::Error(_) | Quantity::ErrorClosest(_) | Quantity::Gap => "mm",
+        Quantity::AimError(_) | Quantity::Angle(_) => "deg",
         Quantity::Stress => "MPa",
         Quantity::Torque(_) => "N·mm",
         Quantity::Force(_) => "N",
@@ -101,6 +116,9 @@ fn series(simulation: &Simulation, quantity: &Quantity) -> Vec<f64> {
     let states = &simulation.motion.states;
     match *quantity {
         Quantity::Error(trace) => simulation.errors_mm.get(trace).cloned().unwrap_or_default(),
+        Quantity::ErrorClosest(trace) => simulation.aims.closest_mm.get(trace).cloned().unwrap_or_default(),
+        Quantity::AimError(i) => simulation.aims.aim_errors_rad.get(i).cloned().unwrap_or_default(),
+        Quantity::Angle(i) => simulation.aims.angles_rad.get(i).cloned().unwrap_or_default(),
         Quantity::Gap => simulation.gaps_mm.clone(),
         Quantity::Stress => states.iter().map(|s| s.stress_max_mpa).collect(),
         Quantity::Torque(drive) | Quantity::Force(drive) => {

@@ -1,6 +1,7 @@
 //! The whole way from text to artefacts, as one function to be read from top to bottom. No I/O here:
 //! files come in through [`Files`], artefacts go out as names and bytes, time and threads come from outside.
 
+mod aims;
 mod assembly;
 mod compiler;
 mod joined;
@@ -10,6 +11,7 @@ mod report;
 mod solids;
 mod stages;
 
+pub use aims::{AimSeries, DirectionMeasures, OutputMeasures};
 pub use compiler::{Compiler, EDGES};
 pub use measure::{aggregate, check_requirements, is_closed, measure};
 pub use progress::{Iteration, Progress, Stage};
@@ -92,7 +94,7 @@ fn run_build(
 
     // Values to numbers: before, after, and what was required.
     let clock = Clock::start(progress, Stage::Simulate);
-    let start = |d: &Design| stages.simulate(d, &d.free.iter().map(|v| v.start).collect::<Vec<_>>());
+    let start = |d: &Design| stages.simulate(d, &starts(d));
     let before: Option<Vec<Simulation>> = assembly.designs.iter().map(|d| start(d).ok()).collect();
     out.before = before.map(|b| assembly::measure_all(&assembly, &assembly::place(&assembly, &b)));
     let after = assembly.designs.iter().zip(&values);
@@ -115,7 +117,7 @@ fn run_build(
     }
     clock.stop(&mut out.seconds.mesh);
     let clock = Clock::start(progress, Stage::Emit);
-    emit_sketches(&assembly, out);
+    emit_sketches(&assembly, &values, out);
     clock.stop(&mut out.seconds.emit);
     Some(())
 }
@@ -136,9 +138,11 @@ pub fn simulate(
 ) -> (BuildOutcome, Option<Simulation>) {
     let mut out = BuildOutcome::default();
     let simulation = front_end(request, stages, files, &mut out).and_then(|assembly| {
-        let simulations = if show.rigid {
-            let rigid = assembly.designs.iter().map(|d| stages.rigid(d)).collect::<Result<Vec<_>, Failed>>();
-            keep(rigid, &mut out.diagnostics)?
+        // Where nothing of the geometry is free, the conventional motion needs no lock.
+        let drawn = assembly.designs.iter().all(|d| d.geometry_variables().is_empty());
+        let simulations = if show.rigid && drawn {
+            let rigid = assembly.designs.iter().map(|d| stages.rigid(d, &starts(d)));
+            keep(rigid.collect::<Result<Vec<_>, Failed>>(), &mut out.diagnostics)?
         } else {
             let mut found = Vec::new();
             for (design, lock) in assembly.designs.iter().zip(read_locks(request, &assembly, &mut out).ok()?)
@@ -151,13 +155,15 @@ pub fn simulate(
                     }
                     _ => Solution { values: start_of(design), ..Solution::default() },
                 };
-                found.push(keep(
-                    stages.simulate(design, &values_of(design, &solution)),
-                    &mut out.diagnostics,
-                )?);
+                let values = values_of(design, &solution);
+                let shown =
+                    if show.rigid { stages.rigid(design, &values) } else { stages.simulate(design, &values) };
+                found.push(keep(shown, &mut out.diagnostics)?);
             }
             // The conventional motion's findings have been told by the check.
-            tell_once(found.iter().flat_map(|s| s.diagnostics.iter().cloned()), &mut out);
+            if !show.rigid {
+                tell_once(found.iter().flat_map(|s| s.diagnostics.iter().cloned()), &mut out);
+            }
             found
         };
         let placed = assembly::place(&assembly, &simulations);
@@ -185,7 +191,7 @@ fn front_end(
     let assembly = checked.assembly?;
     // That it can be assembled all the way is part of being right.
     for design in &assembly.designs {
-        let rigid = keep(stages.rigid(design), &mut out.diagnostics)?;
+        let rigid = keep(stages.rigid(design, &starts(design)), &mut out.diagnostics)?;
         tell_once(rigid.diagnostics, out);
     }
     out.design = assembly.single().cloned();
@@ -324,12 +330,15 @@ fn frozen(design: &Design, request: &Request) -> Diagnostic {
     Diagnostic::error("E0710", message, design.origin).help("build without `--frozen` and keep the new lock")
 }
 
-fn emit_sketches(assembly: &Assembly, out: &mut BuildOutcome) {
+fn emit_sketches(assembly: &Assembly, values: &[Vec<f64>], out: &mut BuildOutcome) {
     for placed in &assembly.exports {
         let export = &placed.export;
         let ExportKind::Arduino(drive) = export.kind else { continue };
         let Some((design, drive)) = assembly::driven(assembly, placed, drive) else { continue };
-        match Sketch::of(&design, drive).and_then(|s| Ok((s.name(), s.render()?))) {
+        let own = placed.instance.and_then(|i| values.get(assembly.instances.get(i)?.design));
+        match Sketch::of(&design, drive, own.map_or(&[], Vec::as_slice))
+            .and_then(|s| Ok((s.name(), s.render()?)))
+        {
             Ok((name, text)) => {
                 out.artefacts.push(Artefact { name: format!("{name}/{name}.ino"), bytes: text.into_bytes() })
             }
@@ -339,6 +348,10 @@ fn emit_sketches(assembly: &Assembly, out: &mut BuildOutcome) {
             }
         }
     }
+}
+
+fn starts(design: &Design) -> Vec<f64> {
+    design.free.iter().map(|v| v.start).collect()
 }
 
 fn start_of(design: &Design) -> std::collections::BTreeMap<String, f64> {

@@ -1,5 +1,6 @@
 //! What a build tells: the numbers before and after, what was required, what was made, how long it took.
 
+use super::aims::{DirectionMeasures, OutputMeasures};
 use crate::diagnostic::{Diagnostic, SourceMap};
 use crate::ir::{Assembly, Design, Solution};
 use serde::Serialize;
@@ -10,6 +11,12 @@ use std::collections::BTreeMap;
 pub struct Measures {
     /// By trace.
     pub traces: BTreeMap<String, TraceMeasures>,
+    /// By traced direction.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub directions: BTreeMap<String, DirectionMeasures>,
+    /// By output.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub outputs: BTreeMap<String, OutputMeasures>,
     /// By drive.
     pub drives: BTreeMap<String, DriveMeasures>,
     /// Of all rods.
@@ -18,7 +25,7 @@ pub struct Measures {
     pub gap: GapMeasures,
 }
 
-/// A trace against its target.
+/// A trace against its target: the place of the same time, or where it is tracked by form only, the nearest one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TraceMeasures {
     /// Mean distance (a closed cycle's last state counts once), mm.

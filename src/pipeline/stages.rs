@@ -1,6 +1,7 @@
 //! The stages as the pipeline sees them: what goes in, what comes out, nothing of how.
 //! [`Compiler`](super::Compiler) is the real thing; tests put small mechanisms with known answers in its place.
 
+use super::aims::AimSeries;
 use super::progress::Iteration;
 use super::report::Artefact;
 use crate::diagnostic::{Diagnostic, SourceMap};
@@ -30,6 +31,8 @@ pub struct Simulation {
     pub motion: MotionTable,
     /// Distance of each trace from its target at every state, mm.
     pub errors_mm: Vec<Vec<f64>>,
+    /// Nearest distances, directions, angles of bodies.
+    pub aims: AimSeries,
     /// Least gap of the printed solids at every state, mm; empty where there is nothing to compare.
     pub gaps_mm: Vec<f64>,
     /// Findings that do not stop the work.
@@ -62,7 +65,7 @@ pub trait Stages {
     ///
     /// # Errors
     /// Where it cannot be assembled, or its mobility does not match its drives.
-    fn rigid(&self, design: &Design) -> Result<Simulation, Failed>;
+    fn rigid(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed>;
 
     /// One sweep of the compliant mechanism from its unstressed rest pose.
     ///

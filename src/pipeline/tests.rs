@@ -31,12 +31,14 @@ fn design() -> Design {
         bodies: Vec::new(),
         joints: Vec::new(),
         rods: Vec::new(),
+        model: Default::default(),
         drives: vec![crate::ir::Drive {
             name: "motor".into(),
             joint: hinge,
             unit: DriveUnit::Rad,
             profile: Profile::Range { from: 0.0, to: std::f64::consts::TAU },
             rest: 0.0,
+            free_rest: None,
             motor: Some(Motor {
                 name: "m".into(),
                 interface: MotorInterface::Stepper { steps_per_turn: 200, microsteps: 8 },
@@ -46,8 +48,10 @@ fn design() -> Design {
             continuous: true,
             origin,
         }],
+        loads: Vec::new(),
         cycle: Cycle { steps: 4, duration_s: 2.0, origin },
         traces: vec![Trace { name: "tip".into(), body: 0, point: [zero; 3], origin }],
+        aims: Default::default(),
         objectives: vec![Objective {
             kind: ObjectiveKind::Track { trace: 0, scale_mm: None },
             weight: 1.0,
@@ -101,7 +105,7 @@ impl Stages for Toy {
         Checked { sources, assembly: Some(Assembly::of(design)), diagnostics: Vec::new() }
     }
 
-    fn rigid(&self, design: &Design) -> Result<Simulation, Failed> {
+    fn rigid(&self, design: &Design, _: &[f64]) -> Result<Simulation, Failed> {
         let states = vec![MotionState::default(); design.cycle.steps + 1];
         Ok(Simulation { motion: MotionTable { states, ..Default::default() }, ..Default::default() })
     }

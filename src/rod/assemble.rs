@@ -50,6 +50,8 @@ pub struct RodSystem {
     pub(crate) twist_scale: f64,
     /// Only for rods with shear.
     pub(crate) shear: Option<Box<ShearSystem>>,
+    /// Weight of a volume, N/mm³.
+    pub(crate) specific_weight: Vector3<f64>,
     /// Shift of the factors in use; none since the last assembly.
     pub(crate) factored: Option<f64>,
 }
@@ -110,6 +112,7 @@ impl RodSystem {
             columns: None,
             twist_scale: 1.0,
             shear: (!rod.shear.is_empty()).then(|| Box::new(ShearSystem::new(n))),
+            specific_weight: Vector3::zeros(),
             factored: None,
         }
     }
@@ -180,6 +183,7 @@ impl RodSystem {
         for i in 1..n {
             self.scatter_mixed(i);
         }
+        self.weigh(rod);
         let pose_b = rod.chain_pose(state, pose_b);
         for (end, pose) in [pose_a, &pose_b].into_iter().enumerate() {
             let vertex = if end == 0 { 1 } else { n - 1 };

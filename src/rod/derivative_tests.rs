@@ -31,6 +31,8 @@ pub(crate) fn curved() -> RodParameters {
         axis: Vector3::new(0.1, -0.2, 1.3),
         a: 0.45,
         b: 1.1,
+        a_to: 0.7,
+        b_to: 0.8,
     }
 }
 
@@ -42,7 +44,7 @@ pub(crate) struct Sample {
 }
 
 /// Kinds of rods every derivative is tested for.
-pub(crate) fn kinds() -> [RodOptions; 4] {
+pub(crate) fn kinds() -> [RodOptions; 6] {
     let plain = RodOptions::default();
     let corrected = RodModel::Corrected.corrections();
     [
@@ -53,7 +55,10 @@ pub(crate) fn kinds() -> [RodOptions; 4] {
             section: SectionShape::Rectangle,
             frames: RestFrames::Transport,
             corrections: corrected,
+            taper: false,
         },
+        RodOptions { taper: true, ..plain },
+        RodOptions { section: SectionShape::Rectangle, corrections: corrected, taper: true, ..plain },
     ]
 }
 

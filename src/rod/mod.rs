@@ -42,7 +42,7 @@
 //! Per iteration: [`RodSystem::assemble`], [`RodSystem::factor`], [`RodSystem::condense`], solve for the
 //! links, [`RodSystem::back_substitute`], [`Rod::retract`]. At an equilibrium of a rod made by
 //! [`Rod::with_derivatives`]: [`RodSystem::parameter_columns`], [`RodSystem::internal_sensitivity`] (or, transposed,
-//! [`RodSystem::internal_pull_back`]), [`RodSystem::strain_jacobian`].
+//! [`RodSystem::internal_pull_back`]), [`RodSystem::strain_jacobian`], [`RodSystem::centreline_jacobian`].
 //!
 //! # Options
 //!
@@ -52,6 +52,7 @@
 //! for the caller.
 
 mod assemble;
+mod centreline;
 mod condense;
 #[cfg(test)]
 mod derivative_tests;
@@ -67,10 +68,13 @@ pub mod single;
 mod state;
 mod stencil;
 mod stress;
+mod weight;
 
+pub use crate::ir::RodModel;
 pub use assemble::RodSystem;
+pub use centreline::CentrelineJacobian;
 pub use condense::FactorReport;
-pub use options::{Corrections, RestFrames, RodModel, RodOptions};
+pub use options::{Corrections, RestFrames, RodOptions};
 pub use rest::{MIN_EDGES, PARAMETERS, RodError, RodParameters};
 pub use section::{RodMaterial, SectionShape, Stiffness, ellipse_stiffness, rectangle_stiffness};
 pub use sensitivity::{ParameterMatrix, SensitivityError};
@@ -84,7 +88,7 @@ use crate::math::dual::Dual;
 use nalgebra::Vector3;
 use rest::{RestShape, rest_shape};
 
-/// A rod: its rest shape and stiffnesses, and on demand their derivatives by the 17 parameters.
+/// A rod: its rest shape and stiffnesses, and on demand their derivatives by the 19 parameters.
 #[derive(Clone, Debug)]
 pub struct Rod {
     parameters: RodParameters,
@@ -109,8 +113,9 @@ pub struct Rod {
     sections: Vec<[f64; 2]>,
     /// Shear compliance per edge, mm/N; empty without shear.
     shear: Vec<f64>,
-    /// Of a rectangle, γ² per twist rate at the boundary points with its derivatives by a and b.
-    torsion: Option<Box<[[f64; 3]; SECTION_POINTS]>>,
+    /// Of a rectangle, γ² per twist rate at the boundary points with its derivatives by a and b: once, of a
+    /// tapered rod per station. Empty for ellipses.
+    torsion: Vec<[[f64; 3]; SECTION_POINTS]>,
     derivatives: Option<Box<RestShape<Dual<PARAMETERS>>>>,
 }
 
@@ -183,8 +188,14 @@ impl Rod {
         stiffness: Option<Stiffness>,
     ) -> Result<Self, RodError> {
         let shape = rest_shape::<f64>(&q.to_array(), &material, edges, &options, stiffness)?;
-        let torsion = (options.section == SectionShape::Rectangle)
-            .then(|| Box::new(section::rectangle_shear_forms(q.a, q.b)));
+        let torsion = match (options.section, options.taper) {
+            (SectionShape::Ellipse, _) => Vec::new(),
+            (SectionShape::Rectangle, false) => vec![section::rectangle_shear_forms(q.a, q.b)],
+            (SectionShape::Rectangle, true) => (0..=edges)
+                .map(|k| stress::station_widths(&shape.sections, k))
+                .map(|[a, b]| section::rectangle_shear_forms(a, b))
+                .collect(),
+        };
         let vertex_stiffness = (0..edges)
             .map(|i| {
                 if i == 0 {

@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use std::fmt;
 
 /// Number of parameters of one rod.
-pub const PARAMETERS: usize = 17;
+pub const PARAMETERS: usize = 19;
 /// Fewest edges: below, the stretch correction of the two end edges would meet.
 pub const MIN_EDGES: usize = 6;
 /// Panels of the arc-length quadrature, eight Gauss points each.
@@ -28,7 +28,7 @@ const GAUSS: [(f64, f64); 4] = [
     (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
 ];
 
-/// The 17 numbers of a rod, rest world coordinates, mm. Their order in arrays is the order of the fields.
+/// The 19 numbers of a rod, rest world coordinates, mm. Their order in arrays is the order of the fields.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RodParameters {
     /// Attachment on link A: P(0).
@@ -42,17 +42,31 @@ pub struct RodParameters {
     /// Joint axis (any length): m₂ is its projection normal to each rest edge, or with
     /// [`RestFrames::Transport`] to the first.
     pub axis: Vector3<f64>,
-    /// Half width along m₁ (thin; of an ellipse the semi-axis), mm.
+    /// Half width along m₁ (thin; of an ellipse the semi-axis), of a tapered rod at end A, mm.
     pub a: f64,
-    /// Half width along m₂ (wide), mm.
+    /// Half width along m₂ (wide), of a tapered rod at end A, mm.
     pub b: f64,
+    /// Half width along m₁ at end B; without meaning unless [`RodOptions::taper`], mm.
+    pub a_to: f64,
+    /// Half width along m₂ at end B; without meaning unless [`RodOptions::taper`], mm.
+    pub b_to: f64,
 }
 
 impl RodParameters {
     /// A straight rod from `from` to `to` in its natural parametrisation.
     pub fn straight(from: Vector3<f64>, to: Vector3<f64>, axis: Vector3<f64>, a: f64, b: f64) -> Self {
         let d = to - from;
-        Self { position_a: from, derivative_a: d, position_b: to, derivative_b: d, axis, a, b }
+        Self {
+            position_a: from,
+            derivative_a: d,
+            position_b: to,
+            derivative_b: d,
+            axis,
+            a,
+            b,
+            a_to: a,
+            b_to: b,
+        }
     }
 
     /// As an array.
@@ -63,8 +77,7 @@ impl RodParameters {
         for (to, v) in q.chunks_exact_mut(3).zip(vectors) {
             to.copy_from_slice(v.as_slice());
         }
-        q[15] = self.a;
-        q[16] = self.b;
+        q[15..].copy_from_slice(&[self.a, self.b, self.a_to, self.b_to]);
         q
     }
 
@@ -79,6 +92,8 @@ impl RodParameters {
             axis: v(12),
             a: q[15],
             b: q[16],
+            a_to: q[17],
+            b_to: q[18],
         }
     }
 }
@@ -270,7 +285,9 @@ pub(crate) fn rest_shape<T: Real>(
         return Err(RodError::NotFinite);
     }
     let positive = |x: f64| x.is_finite() && x > 0.0;
-    if ![q[15].value(), q[16].value(), material.e_mpa].into_iter().all(positive)
+    let last = if options.taper { PARAMETERS } else { PARAMETERS - 2 };
+    if !q[15..last].iter().all(|x| positive(x.value()))
+        || !positive(material.e_mpa)
         || !material.shear_modulus_mpa().is_finite()
         || !positive(material.shear_modulus_mpa())
     {
@@ -335,30 +352,26 @@ pub(crate) fn rest_shape<T: Real>(
         voronoi[i] = (edge_lengths[i - 1] + edge_lengths[i]).scale(0.5);
         measures[i] = integrated_measures(&frames[i - 1], &frames[i]);
     }
-    let section = match stiffness {
-        Some(s) => Stiffness {
-            ea: T::constant(s.ea),
-            ei1: T::constant(s.ei1),
-            ei2: T::constant(s.ei2),
-            gj: T::constant(s.gj),
-        },
-        None => {
-            let s = options.section.stiffness(q[15], q[16], material);
-            if options.corrections.width || options.corrections.warping {
-                let f = options.factors(q[15], q[16], length, material.nu);
-                Stiffness { ea: s.ea, ei1: s.ei1 * f[0], ei2: s.ei2 * f[1], gj: s.gj * f[2] }
-            } else {
-                s
-            }
+    let sections: Vec<[T; 2]> = (0..n).map(|j| widths(q, j, n, options.taper)).collect();
+    let stiffness = match stiffness {
+        Some(s) => {
+            let constant = Stiffness {
+                ea: T::constant(s.ea),
+                ei1: T::constant(s.ei1),
+                ei2: T::constant(s.ei2),
+                gj: T::constant(s.gj),
+            };
+            vec![constant; n]
         }
+        None => section_stiffnesses(&sections, length, material, options),
     };
     let mut shear = Vec::new();
     if options.corrections.shear {
-        let ga =
-            section.ea.scale(options.section.shear_factor() * material.shear_modulus_mpa() / material.e_mpa);
+        let factor = options.section.shear_factor() * material.shear_modulus_mpa() / material.e_mpa;
         // The clamped edges lie half between the attachment planes.
         let part = |j: usize| if j == 0 || j == n - 1 { 0.5 } else { 1.0 };
-        shear.extend(edge_lengths.iter().enumerate().map(|(j, l)| l.scale(part(j)) / ga));
+        let edges = edge_lengths.iter().zip(&stiffness).enumerate();
+        shear.extend(edges.map(|(j, (l, s))| l.scale(part(j)) / s.ea.scale(factor)));
     }
     Ok(RestShape {
         length,
@@ -367,10 +380,47 @@ pub(crate) fn rest_shape<T: Real>(
         edge_lengths,
         voronoi,
         measures,
-        stiffness: vec![section; n],
-        sections: vec![[q[15], q[16]]; n],
+        stiffness,
+        sections,
         shear,
     })
+}
+
+/// Half widths at the middle of edge `j` of `n`, which lies j/(n − 1) along the rod: of a tapered rod linear in
+/// arc length, and those of the ends in the clamped edges.
+fn widths<T: Real>(q: &[T; PARAMETERS], j: usize, n: usize, taper: bool) -> [T; 2] {
+    let [a, b, a_to, b_to] = [q[15], q[16], q[17], q[18]];
+    if !taper {
+        return [a, b];
+    }
+    let u = j as f64 / (n - 1) as f64;
+    [a.scale(1.0 - u) + a_to.scale(u), b.scale(1.0 - u) + b_to.scale(u)]
+}
+
+/// Stiffnesses per edge with the corrections. Those of width and warping come from the clamps and were measured
+/// for whole rods: they are one factor a rod, of its mean widths, which to first order in the taper is the mean
+/// of local ones.
+fn section_stiffnesses<T: Real>(
+    sections: &[[T; 2]],
+    length: T,
+    material: &RodMaterial,
+    options: &RodOptions,
+) -> Vec<Stiffness<T>> {
+    let at = |[a, b]: [T; 2]| options.section.stiffness(a, b, material);
+    let (Some(&first), Some(&last)) = (sections.first(), sections.last()) else { return Vec::new() };
+    let mut all = if options.taper {
+        sections.iter().map(|s| at(*s)).collect()
+    } else {
+        vec![at(first); sections.len()]
+    };
+    if options.corrections.width || options.corrections.warping {
+        let mean = |k: usize| if options.taper { (first[k] + last[k]).scale(0.5) } else { first[k] };
+        let f = options.factors(mean(0), mean(1), length, material.nu);
+        for s in &mut all {
+            *s = Stiffness { ea: s.ea, ei1: s.ei1 * f[0], ei2: s.ei2 * f[1], gj: s.gj * f[2] };
+        }
+    }
+    all
 }
 
 /// Frame (m₁, m₂, t) with m₂ the projection of a unit `axis`, unless that is nearly parallel.
@@ -492,7 +542,9 @@ mod tests {
         let columns = *system.parameter_columns(&rod, &a, &b).unwrap();
         let scale = system.condensed_hessian().amax();
         assert!(columns.amax() < 1e-9 * scale, "{:e} {scale:e}", columns.amax());
-        let d = system.internal_sensitivity(&DMatrix::zeros(12, 17), &DMatrix::identity(17, 17)).unwrap();
+        let d = system
+            .internal_sensitivity(&DMatrix::zeros(12, PARAMETERS), &DMatrix::identity(PARAMETERS, PARAMETERS))
+            .unwrap();
         let rest = rod.derivatives.as_deref().unwrap();
         for c in 0..PARAMETERS {
             for k in 2..=13 {

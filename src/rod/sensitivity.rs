@@ -1,4 +1,4 @@
-//! Sensitivities of a rod to its 17 parameters at an equilibrium (Megaro et al. 2017, eqs. 17–19).
+//! Sensitivities of a rod to its 19 parameters at an equilibrium (Megaro et al. 2017, eqs. 17–19).
 //!
 //! With y the internal freedoms, z the links' and q the parameters: K y' = −(g_q q' + C z'), and the links
 //! see the condensed column b = g_link,q − Cᵀ K⁻¹ g_int,q. A parameter acts through rest lengths, rest
@@ -14,14 +14,14 @@ use crate::math::dual::Dual;
 use crate::math::{Pose, banded::HALF_BANDWIDTH};
 use nalgebra::{DMatrix, SMatrix, SVector, Vector3};
 
-/// Width of the joint solve: 12 link columns, 17 parameters, 3 for the force of rods with shear.
-pub(crate) const WIDTH: usize = 32;
+/// Width of the joint solve: 12 link columns, 19 parameters, 3 for the force of rods with shear.
+pub(crate) const WIDTH: usize = 34;
 /// First parameter column.
 pub(crate) const FIRST_PARAMETER: usize = 12;
 /// First column of the force.
 const FIRST_FORCE: usize = FIRST_PARAMETER + PARAMETERS;
 
-/// 12 by 17: condensed columns.
+/// 12 by 19: condensed columns.
 pub type ParameterMatrix = SMatrix<f64, 12, PARAMETERS>;
 
 /// Solutions kept for the chain rule.
@@ -59,17 +59,17 @@ impl std::fmt::Display for SensitivityError {
 
 impl std::error::Error for SensitivityError {}
 
-type Row = [f64; PARAMETERS];
+pub(crate) type Row = [f64; PARAMETERS];
 
-fn add_scaled(to: &mut Row, s: f64, from: &Row) {
+pub(crate) fn add_scaled(to: &mut Row, s: f64, from: &Row) {
     for (t, f) in to.iter_mut().zip(from) {
         *t += s * f;
     }
 }
 
 impl RodSystem {
-    /// Derivatives of the gradient by the 17 parameters at fixed state and poses, condensed onto the links
-    /// (12 by 17; the links' moved centres do not depend on the parameters). At an equilibrium the links'
+    /// Derivatives of the gradient by the 19 parameters at fixed state and poses, condensed onto the links
+    /// (12 by 19; the links' moved centres do not depend on the parameters). At an equilibrium the links'
     /// sensitivities solve H dz = −b dq − …. Factors the unshifted Hessian if a shifted one was in use;
     /// then [`Self::condensed_hessian`] is renewed too.
     ///
@@ -157,7 +157,7 @@ impl RodSystem {
         self.columns.as_deref().map(|c| &c.condensed)
     }
 
-    /// Sensitivity of the internal freedoms, −K⁻¹(C dz + g_q dq): `d_link` is 12 by n, `dq` 17 by n, the
+    /// Sensitivity of the internal freedoms, −K⁻¹(C dz + g_q dq): `d_link` is 12 by n, `dq` 19 by n, the
     /// result has one row per internal freedom, in the chart of [`Rod::retract`].
     ///
     /// # Errors
@@ -190,7 +190,7 @@ impl RodSystem {
     }
 
     /// The transposed map, for adjoints: a covector on the internal freedoms becomes one on the links (12)
-    /// and one on the parameters (17).
+    /// and one on the parameters (19).
     ///
     /// # Errors
     /// Without parameter columns for this state, or with a covector of the wrong length.
@@ -234,6 +234,7 @@ impl RodSystem {
                 add_scaled(&mut local[1], along * f.m2.dot(&shear.force), &c.eps);
             }
         }
+        self.weight_columns(rod, rest, &mut out);
         for i in 1..n {
             let measures = &self.measures[i];
             let (s0, s1, v) = (&rest.stiffness[i - 1], &rest.stiffness[i], rest.voronoi[i]);

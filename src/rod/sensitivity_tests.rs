@@ -10,6 +10,11 @@ fn step_of(k: usize) -> f64 {
     if k < 12 { 4e-2 } else { 4e-3 }
 }
 
+/// Parameters that a rod depends on.
+fn live(options: &RodOptions) -> usize {
+    if options.taper { PARAMETERS } else { PARAMETERS - 2 }
+}
+
 fn shifted(q: &RodParameters, k: usize, s: f64) -> RodParameters {
     let mut q = q.to_array();
     q[k] += s;
@@ -29,7 +34,9 @@ fn parameter_columns_of(options: RodOptions) {
     system.condense();
     let condensed = *system.parameter_columns(&sample.rod, &sample.a, &sample.b).unwrap();
     let n = sample.rod.internal_freedoms();
-    let p = -system.internal_sensitivity(&DMatrix::zeros(12, 17), &DMatrix::identity(17, 17)).unwrap();
+    let p = -system
+        .internal_sensitivity(&DMatrix::zeros(12, PARAMETERS), &DMatrix::identity(PARAMETERS, PARAMETERS))
+        .unwrap();
     let q0 = curved();
     let energy = |k: usize, dq: f64, i: usize, d: f64| {
         let rod = Rod::with_options(&shifted(&q0, k, dq), MATERIAL, 8, options, false).unwrap();
@@ -42,8 +49,8 @@ fn parameter_columns_of(options: RodOptions) {
         rod.energy(&state)
     };
     // Mixed second derivatives in the chart of the present state.
-    let mut columns = DMatrix::zeros(n + 12, 17);
-    for k in 0..17 {
+    let mut columns = DMatrix::zeros(n + 12, PARAMETERS);
+    for k in 0..live(&options) {
         let dq = step_of(k) * 0.2;
         let own_q = difference(|s| energy(k, s * dq, 0, 0.0), 1.0).1;
         for i in 0..n + 12 {
@@ -57,9 +64,9 @@ fn parameter_columns_of(options: RodOptions) {
     let (inner, coupling) = (h.view((0, 0), (n, n)), h.view((0, n), (n, 12)));
     let got_internal = inner * &p;
     let want_internal = columns.rows(0, n);
-    let got_link = DMatrix::from_fn(12, 17, |i, j| condensed[(i, j)]) + coupling.transpose() * &p;
+    let got_link = DMatrix::from_fn(12, PARAMETERS, |i, j| condensed[(i, j)]) + coupling.transpose() * &p;
     let want_link = columns.rows(n, 12);
-    for k in 0..17 {
+    for k in 0..live(&options) {
         let scale = columns.column(k).amax();
         let e1 = (got_internal.column(k) - want_internal.column(k)).amax() / scale;
         let e2 = (got_link.column(k) - want_link.column(k)).amax() / scale;
@@ -70,7 +77,7 @@ fn parameter_columns_of(options: RodOptions) {
     let w: Vec<f64> = (0..n).map(|i| (i as f64 * 0.7).sin()).collect();
     let (_, pulled) = system.internal_pull_back(&w).unwrap();
     let want = -p.tr_mul(&DVector::from_vec(w));
-    assert!((0..17).all(|k| (pulled[k] - want[k]).abs() < 1e-9 * want.amax()));
+    assert!((0..live(&options)).all(|k| (pulled[k] - want[k]).abs() < 1e-9 * want.amax()));
 }
 
 fn clamped(q: &RodParameters, options: RodOptions) -> SingleRod {
@@ -98,7 +105,7 @@ fn cantilever(q: &RodParameters, options: RodOptions) -> SingleRod {
     s
 }
 
-/// All results that must have the right derivatives: inner vertices, frames, pose of B, stresses.
+/// All results that must have the right derivatives: vertices, pose of B, stresses, wide directions.
 fn results(s: &SingleRod) -> Vec<f64> {
     let mut out = Vec::new();
     for v in &s.state.vertices {
@@ -107,6 +114,9 @@ fn results(s: &SingleRod) -> Vec<f64> {
     out.extend_from_slice(s.pose_b.translation.as_slice());
     for row in s.rod.stresses(&s.system.strains(&s.rod)) {
         out.extend_from_slice(&row);
+    }
+    for (x, m1) in s.state.vertices.windows(2).zip(&s.state.m1) {
+        out.extend_from_slice((x[1] - x[0]).normalize().cross(m1).as_slice());
     }
     out
 }
@@ -117,27 +127,32 @@ fn check(build: impl Fn(&RodParameters) -> SingleRod, free: bool) {
     let (pose_a, pose_b) = (s.pose_a, s.pose_b);
     let h: SMatrix<f64, 12, 12> = *s.system.condensed_hessian();
     let columns = *s.system.parameter_columns(&s.rod, &pose_a, &pose_b).unwrap();
-    let dq = DMatrix::identity(17, 17);
-    let mut d_link = DMatrix::zeros(12, 17);
+    let dq = DMatrix::identity(PARAMETERS, PARAMETERS);
+    let mut d_link = DMatrix::zeros(12, PARAMETERS);
     if free {
         let (_, lh) = LOAD.derivatives(&pose_b);
         let k: SMatrix<f64, 6, 6> = h.fixed_view::<6, 6>(6, 6) + lh;
-        let b: SMatrix<f64, 6, 17> = columns.fixed_rows::<6>(6).into_owned();
+        let b: SMatrix<f64, 6, PARAMETERS> = columns.fixed_rows::<6>(6).into_owned();
         let d = k.lu().solve(&-b).unwrap();
         d_link.rows_mut(6, 6).copy_from(&d);
     }
     let d_internal = s.system.internal_sensitivity(&d_link, &dq).unwrap();
+    let centreline = s.system.centreline_jacobian(&s.rod, &d_link, &dq).unwrap();
     let derivatives = s.system.strain_jacobian(&s.rod).unwrap();
     let edges = s.rod.edges();
     let stations = edges + 1;
     let base = results(&s);
-    for k in 0..17 {
+    for k in 0..PARAMETERS {
         let mut want = Vec::new();
-        // Inner vertices only: those the ends carry are not internal.
         for j in 2..=edges - 2 {
             for c in 0..3 {
-                want.push((3 * j + c, d_internal[(4 * j - 7 + c, k)]));
+                let inner = d_internal[(4 * j - 7 + c, k)];
+                assert!((inner - centreline.vertices[j][(c, k)]).abs() <= 1e-12 * inner.abs());
             }
+        }
+        let frames = base.len() - 3 * edges;
+        for c in 0..3 {
+            want.extend((0..=edges).map(|j| (3 * j + c, centreline.vertices[j][(c, k)])));
         }
         let pose = 3 * (edges + 1);
         for c in 0..3 {
@@ -152,20 +167,28 @@ fn check(build: impl Fn(&RodParameters) -> SingleRod, free: bool) {
                 want.push((at, d.link.dot(&d_link.fixed_view::<12, 1>(0, k)) + d.parameters[k]));
             }
         }
+        let turned: Vec<(usize, f64)> = (0..edges)
+            .flat_map(|j| (0..3).map(move |c| (j, c)))
+            .map(|(j, c)| (frames + 3 * j + c, centreline.m2[j][(c, k)]))
+            .collect();
         let dq = step_of(k);
         let samples: Vec<Vec<f64>> =
             [-2.0, -1.0, 1.0, 2.0].map(|s| results(&build(&shifted(&q0, k, s * dq * 0.25)))).to_vec();
+        let slope = |at: usize| {
+            (8.0 * (samples[2][at] - samples[1][at]) - (samples[3][at] - samples[0][at])) / (12.0 * dq * 0.25)
+        };
+        let largest = turned.iter().map(|(_, got)| got.abs()).fold(1e-3, f64::max);
+        let turn = turned.iter().map(|(at, got)| (got - slope(*at)).abs() / largest).fold(0.0, f64::max);
+        assert!(turn < 1e-6, "q{k}: {turn:e}");
         let mut worst = [0.0f64; 2];
         let mut scale = [0.0f64; 2];
         for (at, _) in &want {
-            let d = (8.0 * (samples[2][*at] - samples[1][*at]) - (samples[3][*at] - samples[0][*at]))
-                / (12.0 * dq * 0.25);
+            let d = slope(*at);
             let kind = usize::from(*at >= stress);
             scale[kind] = scale[kind].max(d.abs());
         }
         for (at, got) in &want {
-            let d = (8.0 * (samples[2][*at] - samples[1][*at]) - (samples[3][*at] - samples[0][*at]))
-                / (12.0 * dq * 0.25);
+            let d = slope(*at);
             let kind = usize::from(*at >= stress);
             worst[kind] = worst[kind].max((got - d).abs() / scale[kind]);
         }

@@ -16,14 +16,15 @@ type Value = Dual<PARAMETERS>;
 
 impl Rod {
     /// By how much, relative to each limit, the rest shape is no sound rod: positive entries violate,
-    /// each with its derivatives by the 17 parameters. Always the same limits in the same order; none
+    /// each with its derivatives by the 19 parameters. Always the same limits in the same order; none
     /// for a rod built without derivatives.
     pub fn shape_excesses(&self) -> Vec<(f64, [f64; PARAMETERS])> {
         let Some(shape) = self.derivatives.as_deref() else { return Vec::new() };
         let q = self.parameters.to_array();
         let variable = |i: usize| Value::variable(q[i], i);
         let one = Value::constant(1.0);
-        let thickness = variable(15) + variable(15);
+        // Of a tapered rod the mean.
+        let thickness = variable(15) + variable(if self.options.taper { 17 } else { 15 });
         let mut out = vec![one - shape.length / thickness.scale(LEAST_SLENDERNESS)];
         for first in [3, 9] {
             let d = [variable(first), variable(first + 1), variable(first + 2)];
@@ -31,7 +32,8 @@ impl Rod {
             out.push(one - speed / shape.length.scale(LEAST_SPEED));
         }
         for i in 1..self.edges {
-            for (k, axis) in [variable(15), variable(16)].into_iter().enumerate() {
+            for k in 0..2 {
+                let axis = (shape.sections[i - 1][k] + shape.sections[i][k]).scale(0.5);
                 let bend = shape.measures[i][k] / shape.voronoi[i] * axis.scale(1.0 / LARGEST_CURVATURE);
                 let size = if bend.value() < 0.0 { -bend } else { bend };
                 out.push(size - one);
@@ -59,6 +61,8 @@ mod tests {
             axis: Vector3::z(),
             a: 1.2,
             b: 2.0,
+            a_to: 1.2,
+            b_to: 2.0,
         }
     }
 

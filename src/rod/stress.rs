@@ -185,6 +185,11 @@ impl Rod {
         ((k as f64 - 0.5) * self.edge_length_mm()).clamp(0.0, self.length)
     }
 
+    /// Half widths (a, b) at station `k`, mm.
+    pub fn station_half_widths_mm(&self, k: usize) -> [f64; 2] {
+        station_widths(&self.sections, k)
+    }
+
     /// Quadrature weights of the stations (trapezia over the rest length), of sum 1.
     pub fn station_weights(&self) -> Vec<f64> {
         let n = self.edges;
@@ -192,9 +197,14 @@ impl Rod {
         (0..=n).map(|k| 0.5 * (s[(k + 1).min(n)] - s[k.saturating_sub(1)]) / self.length).collect()
     }
 
-    fn boundary_point(&self, k: usize) -> BoundaryPoint {
+    /// Of a rectangle, γ² per twist rate round the section at a station.
+    fn shear_forms(&self, station: usize) -> Option<&[[f64; 3]; SECTION_POINTS]> {
+        self.torsion.get(station.min(self.torsion.len().saturating_sub(1)))
+    }
+
+    fn boundary_point(&self, station: usize, k: usize) -> BoundaryPoint {
         let (x, y) = self.options.section.boundary(k);
-        let shear = self.torsion.as_deref().map(|forms| forms[k % SECTION_POINTS]);
+        let shear = self.shear_forms(station).map(|forms| forms[k % SECTION_POINTS]);
         BoundaryPoint { x, y, shear }
     }
 
@@ -206,7 +216,7 @@ impl Rod {
         point: usize,
     ) -> Option<StressSample> {
         let (e, g) = (self.material.e_mpa, self.material.shear_modulus_mpa());
-        let (axial, mises) = strains.get(station)?.stress(&self.boundary_point(point), e, g);
+        let (axial, mises) = strains.get(station)?.stress(&self.boundary_point(station, point), e, g);
         Some(StressSample { station, point, von_mises_mpa: mises, axial_mpa: axial })
     }
 
@@ -214,13 +224,11 @@ impl Rod {
     pub fn stresses(&self, strains: &[StationStrain]) -> Vec<[f64; SECTION_POINTS]> {
         let (e, g) = (self.material.e_mpa, self.material.shear_modulus_mpa());
         let points: [(f64, f64); SECTION_POINTS] = std::array::from_fn(|k| self.options.section.boundary(k));
-        match self.torsion.as_deref() {
-            None => strains.iter().map(|s| points.map(|at| s.ellipse_stress(at, e, g).1)).collect(),
-            Some(forms) => {
-                let at = |s: &StationStrain, k: usize| s.formed_stress(points[k], forms[k][0], e, g).1;
-                strains.iter().map(|s| std::array::from_fn(|k| at(s, k))).collect()
-            }
-        }
+        let row = |(station, s): (usize, &StationStrain)| match self.shear_forms(station) {
+            None => points.map(|at| s.ellipse_stress(at, e, g).1),
+            Some(forms) => std::array::from_fn(|k| s.formed_stress(points[k], forms[k][0], e, g).1),
+        };
+        strains.iter().enumerate().map(row).collect()
     }
 
     /// The largest von Mises stress; of equals the first.
@@ -235,6 +243,17 @@ impl Rod {
         }
         best.and_then(|(station, point, _)| self.stress_sample(strains, station, point))
     }
+}
+
+/// Half widths at station `k` from those of the edges: at a vertex the mean of its two edges, at the attachment
+/// planes those of the clamped ones, whose middles lie there.
+pub(crate) fn station_widths(sections: &[[f64; 2]], k: usize) -> [f64; 2] {
+    let at = |j: usize| sections.get(j.min(sections.len().saturating_sub(1))).copied().unwrap_or_default();
+    if k == 0 || k >= sections.len() {
+        return at(k);
+    }
+    let (s, r) = (at(k - 1), at(k));
+    [0.5 * (s[0] + r[0]), 0.5 * (s[1] + r[1])]
 }
 
 /// Extrapolates station values (inner stations filled) to the two attachment planes, half an edge outside.
@@ -272,8 +291,8 @@ impl RodSystem {
         values.into_iter().map(StationStrain::from_values).collect()
     }
 
-    /// Derivatives of the strain measures of the last assembled equilibrium by the rod's own 29 directions:
-    /// the 12 link freedoms, then the 17 parameters, the inside of the rod following both.
+    /// Derivatives of the strain measures of the last assembled equilibrium by the rod's own 31 directions:
+    /// the 12 link freedoms, then the 19 parameters, the inside of the rod following both.
     ///
     /// # Errors
     /// Without derivatives, or without parameter columns for this state.
@@ -373,7 +392,7 @@ fn add_parameters(to: &mut [f64; WIDTH], s: f64, from: &[f64; PARAMETERS]) {
 }
 
 /// Strain measures of an equilibrium with their derivatives by the rod's 29 own directions, which the
-/// caller chains with dz/dp (12 by n) and dq/dp (17 by n): sums over many samples first, then once.
+/// caller chains with dz/dp (12 by n) and dq/dp (19 by n): sums over many samples first, then once.
 #[derive(Clone, Debug)]
 pub struct StrainJacobian {
     rows: Vec<[[f64; WIDTH]; STATION_VALUES]>,
@@ -395,7 +414,7 @@ impl StrainJacobian {
     pub fn stress(&self, rod: &Rod, station: usize, point: usize) -> Option<(f64, RodDirections)> {
         let (strain, rows) = (self.strains.get(station)?, self.rows.get(station)?);
         let (e, g) = (rod.material.e_mpa, rod.material.shear_modulus_mpa());
-        let (mises, d) = strain.stress_gradient(&rod.boundary_point(point), e, g);
+        let (mises, d) = strain.stress_gradient(&rod.boundary_point(station, point), e, g);
         let mut sum = [0.0; WIDTH];
         for (d, row) in d.into_iter().zip(rows) {
             add_scaled(&mut sum, d, row);
@@ -416,6 +435,6 @@ fn directions(row: &[f64; WIDTH]) -> RodDirections {
 pub struct RodDirections {
     /// By the 12 link freedoms.
     pub link: SVector<f64, 12>,
-    /// By the 17 parameters.
+    /// By the 19 parameters.
     pub parameters: SVector<f64, PARAMETERS>,
 }

@@ -90,7 +90,7 @@ pub struct Flexure {
     pub name: Ident,
     /// The joint kind it replaces, e.g. `hinge`.
     pub replaces: Ident,
-    /// `param`, `let` and `rod` statements in order.
+    /// `param`, `let`, `body` and `rod` statements in order.
     pub statements: Vec<Statement>,
     /// Doc comment.
     pub doc: String,
@@ -157,6 +157,8 @@ pub enum StatementKind {
         /// Height.
         height: Expr,
     },
+    /// `model NAME`: theory of the flexures.
+    Model(Ident),
     /// `cycle N steps [over T]`
     Cycle {
         /// Number of steps.
@@ -182,14 +184,30 @@ pub enum StatementKind {
         /// Its value in the rest pose (may be `free`).
         value: Expr,
     },
-    /// `trace NAME = P on BODY`
+    /// `trace NAME = P on BODY`, `trace NAME = direction D on BODY`
     Trace {
         /// Name.
         name: Ident,
-        /// Point.
+        /// `direction` was written.
+        direction: bool,
+        /// Point or direction.
         point: Expr,
         /// Body.
         body: Ident,
+    },
+    /// `output NAME = angle(BODY about D)`
+    Output {
+        /// Name.
+        name: Ident,
+        /// What is measured.
+        value: Expr,
+    },
+    /// `target TRACE = …`
+    Target {
+        /// The trace.
+        trace: Ident,
+        /// A file, a list of points, or an expression of t.
+        value: Expr,
     },
     /// `minimize { TERM [weight W] … }`
     Minimize(Vec<Term>),
@@ -204,12 +222,21 @@ pub enum StatementKind {
     },
     /// `export A, B(c)`
     Export(Vec<Expr>),
-    /// `rod NAME { from a at … along … to b at … along … section … }` (templates only)
+    /// `load …`
+    Load(Box<Load>),
+    /// `rod NAME { [axis second] from a at … along … to b at … along … section … }` (templates only)
     Rod(Box<Rod>),
     /// `place NAME = MECHANISM at P [turned A about D] [scale = K] [merging GROUND into BODY]…`
     Place(Box<Place>),
     /// `mirror NAME = INSTANCE across yz [sharing BODY, …]`
     Mirror(Box<Mirror>),
+    /// `body NAME`: a body that a template brings along (templates only)
+    OwnBody {
+        /// Name.
+        name: Ident,
+        /// Points written in braces: it has none.
+        points: Vec<Ident>,
+    },
     /// A statement of the target language that this version does not have yet: its keyword.
     Later {
         /// Keyword.
@@ -219,6 +246,36 @@ pub enum StatementKind {
     Broken {
         /// The words in it: names that it may have declared.
         words: Vec<String>,
+    },
+}
+
+/// A load on the mechanism.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Load {
+    /// `load gravity DIRECTION`
+    Gravity {
+        /// Where down is.
+        direction: Expr,
+    },
+    /// `load moment SIZE about D on BODY`
+    Moment {
+        /// Size, may depend on t.
+        size: Expr,
+        /// Its axis.
+        about: Expr,
+        /// The body it turns.
+        body: Ident,
+    },
+    /// `load SIZE along D on BODY at P`
+    Force {
+        /// Size, may depend on t.
+        size: Expr,
+        /// Its direction.
+        along: Expr,
+        /// The body it acts on.
+        body: Ident,
+        /// Where.
+        point: Expr,
     },
 }
 
@@ -333,18 +390,22 @@ pub enum Compare {
 pub struct Rod {
     /// Name.
     pub name: Ident,
+    /// `axis second`: where it says so; true for the second axis.
+    pub second_axis: Option<At<bool>>,
     /// `from BODY at … along …`
     pub from: RodEnd,
     /// `to BODY at … along …`
     pub to: RodEnd,
     /// `section …`
     pub section: Expr,
+    /// `section … to …`
+    pub section_to: Option<Expr>,
 }
 
 /// One end of a rod.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RodEnd {
-    /// `a`, `b`, `c`: the joint's bodies in order.
+    /// `a`, `b`, `c`: the joint's bodies in order; or a body of the template's own.
     pub body: Ident,
     /// Position, e.g. a call of `cyl`.
     pub position: Expr,
@@ -396,6 +457,13 @@ pub enum ExprKind {
         lower: Box<Expr>,
         /// Upper bound.
         upper: Box<Expr>,
+    },
+    /// `BODY about D`: only as an argument of `angle`.
+    About {
+        /// The body that turns.
+        body: Ident,
+        /// The axis.
+        axis: Box<Expr>,
     },
     /// What could not be understood; a diagnostic has been given already.
     Broken,

@@ -84,6 +84,16 @@ impl Lower<'_> {
                 let mut depth = 0;
                 let mut arguments = Vec::new();
                 for argument in node.all(Kind::Argument) {
+                    if let Some(about) = argument.first(Kind::About) {
+                        if let (Some(body), Some(axis)) = (self.ident(about), about.first(Kind::Value)) {
+                            let (axis, d) = self.measured(axis);
+                            depth = (d + 1).max(depth);
+                            let kind = ExprKind::About { body, axis: Box::new(axis) };
+                            let value = Expr { kind, at: self.origin(about) };
+                            arguments.push(Argument { name: None, value });
+                        }
+                        continue;
+                    }
                     let Some(value) = argument.first(Kind::Value) else { continue };
                     let (value, d) = self.measured(value);
                     depth = d.max(depth);
@@ -177,7 +187,7 @@ fn dismantle(expr: Expr) {
     while let Some(expr) = todo.pop() {
         match expr.kind {
             ExprKind::Tuple(items) => todo.extend(items),
-            ExprKind::Negate(a) => todo.push(*a),
+            ExprKind::Negate(a) | ExprKind::About { axis: a, .. } => todo.push(*a),
             ExprKind::Binary(_, a, b) => todo.extend([*a, *b]),
             ExprKind::Call { arguments, .. } => todo.extend(arguments.into_iter().map(|a| a.value)),
             ExprKind::Free { start, lower, upper } => todo.extend([*start, *lower, *upper]),

@@ -88,6 +88,8 @@ fn is_weak(rule: Rule) -> bool {
             | Rule::unit_power
             | Rule::dot
             | Rule::lparen
+            | Rule::kw_about
+            | Rule::kw_direction
     )
 }
 
@@ -136,6 +138,10 @@ fn words(rule: Rule) -> String {
         Rule::scaled => "`scale`",
         Rule::merging => "`merging`",
         Rule::sharing => "`sharing`",
+        Rule::rod_axis => "`axis`",
+        Rule::load_gravity => "`gravity`",
+        Rule::load_moment => "`moment`",
+        Rule::load_force => "a value",
         other => {
             // Keyword rules are called after their keyword.
             let name = format!("{other:?}");
@@ -230,6 +236,7 @@ fn kind(rule: Rule) -> Kind {
         Rule::st_material => Kind::MaterialUse,
         Rule::st_print => Kind::Print,
         Rule::st_links => Kind::Links,
+        Rule::st_model => Kind::Model,
         Rule::st_cycle => Kind::Cycle,
         Rule::st_drive => Kind::Drive,
         Rule::profile => Kind::Range,
@@ -239,6 +246,8 @@ fn kind(rule: Rule) -> Kind {
         Rule::drum => Kind::Drum,
         Rule::st_rest => Kind::Rest,
         Rule::st_trace => Kind::Trace,
+        Rule::st_output => Kind::Output,
+        Rule::st_target => Kind::Target,
         Rule::st_minimize => Kind::Minimize,
         Rule::term => Kind::Term,
         Rule::st_require => Kind::Require,
@@ -254,6 +263,12 @@ fn kind(rule: Rule) -> Kind {
         Rule::merging => Kind::Merging,
         Rule::st_mirror => Kind::Mirror,
         Rule::sharing => Kind::Sharing,
+        Rule::rod_axis => Kind::RodAxis,
+        Rule::st_own => Kind::OwnBody,
+        Rule::st_load => Kind::Load,
+        Rule::load_gravity => Kind::Gravity,
+        Rule::load_moment => Kind::Moment,
+        Rule::load_force => Kind::Force,
         Rule::st_later => Kind::Later,
         Rule::value => Kind::Value,
         Rule::free => Kind::Free,
@@ -264,6 +279,7 @@ fn kind(rule: Rule) -> Kind {
         Rule::tuple => Kind::Tuple,
         Rule::call => Kind::Call,
         Rule::argument => Kind::Argument,
+        Rule::about => Kind::About,
         Rule::name => Kind::Name,
         Rule::number => Kind::Number,
         Rule::unit => Kind::Unit,

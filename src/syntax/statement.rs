@@ -1,7 +1,7 @@
 //! Statements: concrete tree to [`ast::StatementKind`].
 
 use super::ast::{
-    At, Compare, Expr, Ident, Joint, Profile, Rod, RodEnd, Statement, StatementKind, TemplateUse, Term,
+    At, Compare, Expr, Ident, Joint, Load, Profile, Rod, RodEnd, Statement, StatementKind, TemplateUse, Term,
 };
 use super::lower::Lower;
 use super::tree::{Kind, Node};
@@ -52,6 +52,7 @@ impl Lower<'_> {
             Kind::MaterialUse => StatementKind::Material(self.ident(node)?),
             Kind::Print => StatementKind::PrintOn(self.ident(node)?),
             Kind::Links => StatementKind::Links { height: self.value(node)? },
+            Kind::Model => StatementKind::Model(self.ident(node)?),
             Kind::Cycle => {
                 let mut values = self.values(node).into_iter();
                 StatementKind::Cycle { steps: values.next()?, over: values.next() }
@@ -61,8 +62,11 @@ impl Lower<'_> {
             Kind::Trace => {
                 let mut names = self.idents(node).into_iter();
                 let (name, body) = (names.next()?, names.next()?);
-                StatementKind::Trace { name, point: self.value(node)?, body }
+                let direction = node.all(Kind::Keyword).any(|n| self.text(n) == "direction");
+                StatementKind::Trace { name, direction, point: self.value(node)?, body }
             }
+            Kind::Output => StatementKind::Output { name: self.ident(node)?, value: self.value(node)? },
+            Kind::Target => StatementKind::Target { trace: self.ident(node)?, value: self.value(node)? },
             Kind::Minimize => self.minimize(node),
             Kind::Require => self.require(node)?,
             Kind::Export => StatementKind::Export(
@@ -71,6 +75,11 @@ impl Lower<'_> {
             Kind::Rod => StatementKind::Rod(Box::new(self.rod(node)?)),
             Kind::Place => StatementKind::Place(Box::new(self.place(node)?)),
             Kind::Mirror => StatementKind::Mirror(Box::new(self.mirror(node)?)),
+            Kind::OwnBody => StatementKind::OwnBody {
+                name: self.ident(node)?,
+                points: node.first(Kind::Points).map(|n| self.idents(n)).unwrap_or_default(),
+            },
+            Kind::Load => StatementKind::Load(Box::new(self.load(node)?)),
             Kind::Later => StatementKind::Later { keyword: self.named(node.first(Kind::Keyword)?) },
             _ => return None,
         })
@@ -198,13 +207,35 @@ impl Lower<'_> {
         Some(StatementKind::Require { left: values.next()?, op, right: values.next()? })
     }
 
+    fn load(&mut self, node: &Node) -> Option<Load> {
+        let form = node.parts().find(|n| matches!(n.kind, Kind::Gravity | Kind::Moment | Kind::Force))?;
+        let mut values = self.values(form).into_iter();
+        let first = values.next()?;
+        Some(match form.kind {
+            Kind::Gravity => Load::Gravity { direction: first },
+            Kind::Moment => Load::Moment { size: first, about: values.next()?, body: self.ident(form)? },
+            _ => {
+                let (along, point) = (values.next()?, values.next()?);
+                Load::Force { size: first, along, body: self.ident(form)?, point }
+            }
+        })
+    }
+
     fn rod(&mut self, node: &Node) -> Option<Rod> {
+        let mut section = self.values(node.first(Kind::RodSection)?).into_iter();
         Some(Rod {
             name: self.ident(node)?,
+            second_axis: node.first(Kind::RodAxis).map(|n| self.which_axis(n)),
             from: self.rod_end(node.first(Kind::RodFrom)?)?,
             to: self.rod_end(node.first(Kind::RodTo)?)?,
-            section: self.value(node.first(Kind::RodSection)?)?,
+            section: section.next()?,
+            section_to: section.next(),
         })
+    }
+
+    fn which_axis(&self, node: &Node) -> At<bool> {
+        let second = node.all(Kind::Keyword).any(|n| self.text(n) == "second");
+        At { node: second, at: self.origin(node) }
     }
 
     fn rod_end(&mut self, node: &Node) -> Option<RodEnd> {
@@ -221,13 +252,14 @@ impl Lower<'_> {
                 StatementKind::Param { .. } | StatementKind::Let { .. } => (true, ""),
                 StatementKind::Later { .. } | StatementKind::Broken { .. } => (true, ""),
                 StatementKind::Rod(_) => (!mechanism, "a rod belongs in a `flexure`"),
+                StatementKind::OwnBody { .. } => (!mechanism, "a flexure's own body belongs in a `flexure`"),
                 _ => (mechanism, "this statement belongs in a `mechanism`"),
             };
             if !fits {
                 let help = if mechanism {
-                    "a mechanism gets its rods from a joint's `as TEMPLATE`"
+                    "a mechanism gets these from a joint's `as TEMPLATE`"
                 } else {
-                    "a flexure holds `param`, `let` and `rod` statements"
+                    "a flexure holds `param`, `let`, `body` and `rod` statements"
                 };
                 self.report(Diagnostic::error("E0009", what, statement.at).help(help));
                 statement.kind = StatementKind::Broken { words: Vec::new() };

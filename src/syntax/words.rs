@@ -20,6 +20,7 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
     "material",
     "print",
     "links",
+    "model",
     "cycle",
     "drive",
     "rest",
@@ -28,15 +29,15 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
     "require",
     "export",
     "rod",
+    "body",
+    "load",
     "allow",
     "assert",
-    "body",
     "case",
     "fatigue",
     "for",
     "hole",
     "horn",
-    "load",
     "mirror",
     "mount",
     "output",
@@ -64,7 +65,7 @@ pub(super) fn starts_statement(line: &str) -> bool {
 }
 
 /// How many of [`STATEMENT_WORDS`], which begins with the common ones, help lists.
-pub(super) const COMMON_STATEMENTS: usize = 22;
+pub(super) const COMMON_STATEMENTS: usize = 23;
 
 /// Whether a keyword is a kind of joint.
 pub(super) fn is_joint_kind(word: &str) -> bool {
@@ -89,10 +90,13 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "material" => "material NAME",
         "print" => "print on PROCESS",
         "links" => "links height LENGTH",
+        "model" => "model corrected` or `model plain",
         "cycle" => "cycle NUMBER steps over TIME",
         "drive" => "drive JOINT from VALUE to VALUE with MOTOR",
         "rest" => "rest JOINT at VALUE",
         "trace" => "trace NAME = POINT on BODY",
+        "output" => "output NAME = angle(BODY about AXIS)",
+        "target" => "target TRACE = path(\"FILE.csv\")",
         "minimize" => "minimize {",
         "term" => "TERM(…) weight NUMBER",
         "field" => "NAME = VALUE",
@@ -100,7 +104,9 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "export" => "export NAME, …",
         "place" => "place NAME = MECHANISM at POINT",
         "mirror" => "mirror NAME = INSTANCE across yz",
+        "body" => "body NAME",
         "rod" => "rod NAME { from a at … along … to b at … along … section … }",
+        "load" => "load FORCE along DIRECTION on BODY at POINT",
         _ => return None,
     })
 }

@@ -2,6 +2,7 @@
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 pub mod annotated;
+pub mod gradient;
 
 use flexura::elaborate::{FileError, Files};
 use flexura::ir::Design;
@@ -42,4 +43,14 @@ pub fn shaken(design: &Design, seed: u64) -> Vec<f64> {
             (f.start + 0.2 * r * width).clamp(f.lower + 0.01 * width, f.upper - 0.01 * width)
         })
         .collect()
+}
+
+/// Numbers in −1..1, the same for the same seed.
+pub fn noise(seed: u64, n: usize) -> Vec<f64> {
+    let mut s = seed;
+    let mut next = || {
+        s = s.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        2.0 * ((s >> 11) as f64 / (1u64 << 53) as f64) - 1.0
+    };
+    (0..n).map(|_| next()).collect()
 }

@@ -129,13 +129,16 @@ pub fn chebyshev(bulge_deg: f64, facets: Facets) -> PartsInput {
     let up = |q: Vector3<f64>, layer: f64| q + Vector3::z() * (layer * pitch);
     let body = |name: &str, layer: f64, skeleton: Vec<Vector3<f64>>, eyes: Vec<Eye>| BodySolid {
         name: name.into(),
+        axis: Some(Vector3::z()),
         level_mm: layer * pitch,
         skeleton,
         eyes,
+        guides: Vec::new(),
     };
     let eye = |joint: usize, point: Vector3<f64>, bore: Bore, slot: usize| Eye {
         joint,
         point,
+        axis: Vector3::z(),
         bore,
         slot: (slot, 2),
     };
@@ -178,12 +181,12 @@ pub fn chebyshev(bulge_deg: f64, facets: Facets) -> PartsInput {
         THICK[1],
     ));
     PartsInput {
-        axis: Vector3::z(),
         height_mm: HEIGHT,
         clearance_mm: CLEARANCE,
         least_wall_mm: 0.6,
         bodies,
         flexures,
+        motion: Vec::new(),
         facets,
     }
 }

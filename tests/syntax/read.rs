@@ -1,7 +1,7 @@
 //! What is read: samples, a small file's tree and AST, the later language, text in odd encodings.
 
 use crate::{CHEBYSHEV, CROSSED_LEAVES};
-use flexura::syntax::ast::{BinaryOp, ExprKind, Item, Profile, StatementKind};
+use flexura::syntax::ast::{BinaryOp, ExprKind, Item, Load, Profile, StatementKind};
 use flexura::syntax::{Parse, parse};
 
 /// Parses text that must be right.
@@ -60,6 +60,7 @@ fn grouped(kind: &ExprKind) -> String {
         ExprKind::Free { start, lower, upper } => {
             format!("free {} in {} .. {}", grouped(&start.kind), grouped(&lower.kind), grouped(&upper.kind))
         }
+        ExprKind::About { body, axis } => format!("({} about {})", body.node, grouped(&axis.kind)),
         ExprKind::Broken => "broken".into(),
     }
 }
@@ -140,12 +141,35 @@ fn keywords_are_names_where_no_statement_starts() {
 }
 
 #[test]
+fn loads_have_three_forms() {
+    let kinds = statements(
+        "load 4 N * t along (0, 0, 1) on knuckle at W
+        load moment 8 N*mm about -z on knuckle
+        load gravity (0, -1, 0)
+        cycle in 20 steps over 1 s",
+    );
+    let words: Vec<String> = kinds
+        .iter()
+        .map(|s| match s {
+            StatementKind::Load(load) => match &**load {
+                Load::Force { body, .. } => format!("force on {}", body.node),
+                Load::Moment { body, .. } => format!("moment on {}", body.node),
+                Load::Gravity { .. } => "gravity".into(),
+            },
+            StatementKind::Cycle { over, .. } => format!("cycle {}", over.is_some()),
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    assert_eq!(words, ["force on knuckle", "moment on knuckle", "gravity", "cycle true"]);
+}
+
+#[test]
 fn statements_of_the_whole_language_are_known_by_their_keyword() {
     let body = "place right = half at (0 mm,\n  0 mm) turned 90 deg about y
         mirror left = right across yz sharing a, b
         mount xl320 on a at S
         string cable: a at C1 to palm via C2
-        body ring {
+        variant ring {
             param x = 1
         }
         assert x < 2 \"message { not closed\"
@@ -175,6 +199,7 @@ fn statements_of_the_whole_language_are_known_by_their_keyword() {
             } => {
                 format!("{} keys {:?} {continuous}", keys.len(), motor.as_ref().map(|m| m.node.as_str()))
             }
+            StatementKind::Load(_) => "load".into(),
             other => panic!("{other:?}"),
         })
         .collect();
@@ -185,7 +210,7 @@ fn statements_of_the_whole_language_are_known_by_their_keyword() {
             "mirror left right yz [\"a\", \"b\"]",
             "mount",
             "string",
-            "body",
+            "variant",
             "assert",
             "2 keys Some(\"xl320\") true",
             "drum",

@@ -140,11 +140,11 @@ pub struct StepTable {
 }
 
 impl Sketch {
-    /// What the sketch of a design's drive needs to know.
+    /// What the sketch of a design's drive needs to know; `values` are the free variables in the design's order.
     ///
     /// # Errors
     /// When there is no such drive, or its motor is not a stepper.
-    pub fn of(design: &Design, drive: usize) -> Result<Self, SketchError> {
+    pub fn of(design: &Design, drive: usize, values: &[f64]) -> Result<Self, SketchError> {
         let drive = design.drives.get(drive).ok_or(SketchError::NoDrive)?;
         if drive.unit != DriveUnit::Rad {
             return Err(SketchError::Slides);
@@ -157,7 +157,8 @@ impl Sketch {
         if states == 0 || states > MOST_STATES {
             return Err(SketchError::States { states });
         }
-        let angle = |state| drive.value(state as f64 / states as f64) - drive.rest;
+        let rest = drive.rest_value(&design.exprs.values(values));
+        let angle = |state| drive.value(state as f64 / states as f64) - rest;
         Ok(Self {
             mechanism: design.name.clone(),
             drive: drive.name.clone(),
@@ -166,7 +167,7 @@ impl Sketch {
             angles_rad: (0..=states).map(angle).collect(),
             duration_s: design.cycle.duration_s,
             closed: drive.is_closed(),
-            rest_rad: drive.rest,
+            rest_rad: rest,
         })
     }
 

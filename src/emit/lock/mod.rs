@@ -3,7 +3,7 @@
 //! ```text
 //! # flexura lock 1
 //! design sha256:…         key: digest of the elaborated design
-//! solver 1                a solver that would find another optimum counts as another design
+//! solver 2                a solver that would find another optimum counts as another design
 //! values sha256:…         digest of the entries: notices an edit or a bad merge
 //! iterations 23
 //! converged true
@@ -22,7 +22,7 @@ mod several;
 pub use several::Head;
 
 /// Raised whenever the solver would find something else for the same design.
-pub const SOLVER_VERSION: &str = "1";
+pub const SOLVER_VERSION: &str = "2";
 const TITLE: &str = "# flexura lock 1";
 
 /// How a damaged lock is mended; said with every error of this file.
@@ -141,6 +141,13 @@ pub fn design_digest(design: &Design) -> String {
     if let Value::Object(fields) = &mut value {
         fields.remove("exports");
         fields.remove("requirements");
+        // Angles are only looked at.
+        if let Some(Value::Object(aims)) = fields.get_mut("aims") {
+            aims.remove("angles");
+            if aims.is_empty() {
+                fields.remove("aims");
+            }
+        }
     }
     let mut canonical = format!("flexura design, solver {SOLVER_VERSION}\n");
     write_canonical(&value, &mut canonical);

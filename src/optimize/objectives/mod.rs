@@ -2,19 +2,23 @@
 //!
 //! A term is a sum over the states ([`Objective`]) or a soft maximum over all of them ([`Sampled`]).
 
+mod aim;
+mod collision;
+mod paper;
 mod soft_maximum;
 mod stress;
 mod sway;
 mod torque;
 mod track;
 
-pub use soft_maximum::{Level, Sampled};
+pub use soft_maximum::{Level, Sampled, SoftForm};
 
-use crate::equilibrium::{Equilibrium, Layout, Model, PointForce, Sensitivity};
+use crate::equilibrium::{Equilibrium, Layout, Model, PointForce, PointForceChange, Sensitivity};
+use crate::geometry::SkeletonCapsule;
 use crate::ir::{Design, ObjectiveKind};
 use crate::math::skew;
 use crate::optimize::Normal;
-use nalgebra::{Matrix3xX, Vector3};
+use nalgebra::Matrix3xX;
 
 /// Sums over the cycle are means times this, so that the number of steps does not change the balance
 /// of the terms; the paper's weights belong to 60 steps.
@@ -32,6 +36,8 @@ pub struct StateView<'a> {
     pub state: usize,
     /// Weight of this state in sums over the cycle: 60 / number of counted states.
     pub share: f64,
+    /// The links as capsules in the rest pose; empty unless a term asks for them ([`needs_links`]).
+    pub capsules: &'a [SkeletonCapsule],
 }
 
 /// Derivatives of a state's equilibria.
@@ -94,25 +100,94 @@ pub fn build(design: &Design, layout: &Layout) -> (Vec<Term>, Vec<Vec<PointForce
             ObjectiveKind::Stress { scale_mpa } => {
                 Term::Peak(Box::new(stress::StressPeak::new(*scale_mpa, o.weight)))
             }
+            ObjectiveKind::Collision { gap_mm } => {
+                Term::Sum(Box::new(collision::Collision::new(design, *gap_mm, o.weight)))
+            }
             ObjectiveKind::Torque { drive, reference_n_mm } => {
                 let name = &design.drives[*drive].name;
                 Term::Peak(Box::new(torque::Torque::new(name, *drive, *reference_n_mm, o.weight)))
+            }
+            ObjectiveKind::TrackAs { trace, scale_mm, closest, emphasis } => {
+                let name = &design.traces[*trace].name;
+                let emphasis = track::Emphasis::new(emphasis.as_ref(), design.cycle.steps);
+                let term = track::Track::with(name, *trace, *scale_mm, o.weight, *closest, emphasis);
+                Term::Sum(Box::new(term))
+            }
+            ObjectiveKind::Aim { direction, scale_rad, emphasis } => {
+                let name = &design.aims.directions[*direction].name;
+                let emphasis = track::Emphasis::new(emphasis.as_ref(), design.cycle.steps);
+                Term::Sum(Box::new(aim::Aim::new(name, *direction, *scale_rad, o.weight, emphasis)))
+            }
+            ObjectiveKind::SwayAlong { trace, force_n, scale_mm, along } => {
+                let first = cases.len();
+                match along {
+                    Some(along) => cases.push(sway::load_along(layout, *trace, *force_n, *along)),
+                    None => {
+                        cases.extend(sway::load_cases(design, layout, *trace, *force_n).into_iter().take(1))
+                    }
+                }
+                let name = &design.traces[*trace].name;
+                let term = sway::Sway::new(name, *trace, first..cases.len(), *scale_mm, o.weight);
+                Term::Sum(Box::new(term))
+            }
+            ObjectiveKind::PaperTorque { drive, reference_n_mm } => {
+                let name = &design.drives[*drive].name;
+                Term::Peak(Box::new(paper::PaperTorque::new(name, *drive, *reference_n_mm, o.weight)))
+            }
+            ObjectiveKind::PaperStress { scale_mpa } => {
+                Term::Peak(Box::new(paper::PaperStress::new(*scale_mpa, o.weight)))
             }
         })
         .collect();
     (terms, cases)
 }
 
-/// Derivatives of a body's point (rest coordinates) by the n design parameters, 3 × n; none on ground.
-fn point_rows(
+/// How the load cases of [`build`] change with each of the layout's changes: per case, change and state.
+pub fn load_changes(design: &Design, layout: &Layout) -> Vec<Vec<Vec<PointForceChange>>> {
+    let mut changes = Vec::new();
+    for o in &design.objectives {
+        match &o.kind {
+            ObjectiveKind::Sway { trace, force_n, .. } => {
+                changes.extend(sway::load_case_changes(design, layout, *trace, *force_n));
+            }
+            ObjectiveKind::SwayAlong { trace, force_n, along: None, .. } => {
+                let both = sway::load_case_changes(design, layout, *trace, *force_n);
+                changes.extend(both.into_iter().take(1));
+            }
+            ObjectiveKind::SwayAlong { trace, along: Some(_), .. } => {
+                changes.push(sway::load_along_change(layout, *trace));
+            }
+            _ => {}
+        }
+    }
+    changes
+}
+
+/// Whether a term sees where links and flexures are, not only what moves.
+pub fn needs_links(design: &Design) -> bool {
+    design.objectives.iter().any(|o| matches!(o.kind, ObjectiveKind::Collision { .. }))
+}
+
+/// Derivatives of a trace's place by the n design parameters, 3 × n: as its body moves, and as it moves within.
+fn trace_rows(
     model: &Model,
     equilibrium: &Equilibrium,
     sensitivity: &Sensitivity,
-    body: usize,
-    rest: &Vector3<f64>,
-) -> Option<Matrix3xX<f64>> {
-    let first = model.layout.bodies[body].first_dof?;
-    let arm = equilibrium.state.poses[body].arm(rest);
-    // δz = δu + δφ × r
-    Some(sensitivity.links.fixed_rows::<3>(first) - skew(&arm) * sensitivity.links.fixed_rows::<3>(first + 3))
+    index: usize,
+) -> Matrix3xX<f64> {
+    let trace = &model.layout.traces[index];
+    let pose = &equilibrium.state.poses[trace.body];
+    let mut rows = match model.layout.bodies[trace.body].first_dof {
+        // δz = δu + δφ × r
+        Some(first) => {
+            sensitivity.links.fixed_rows::<3>(first)
+                - skew(&pose.arm(&trace.rest)) * sensitivity.links.fixed_rows::<3>(first + 3)
+        }
+        None => Matrix3xX::zeros(model.p.len()),
+    };
+    for change in model.layout.changes.iter().flatten() {
+        let mut column = rows.column_mut(change.parameter);
+        column += pose.direction(&change.traces[index].rest);
+    }
+    rows
 }

@@ -18,11 +18,25 @@ pub trait Sampled: Send + Sync {
     fn name(&self) -> &str;
     /// What the soft maximum counts in the sum, per unit of x.
     fn weight(&self) -> f64;
+    /// Which soft maximum.
+    fn form(&self) -> SoftForm {
+        SoftForm::Monotone
+    }
     /// Calls `f(x, w)` for every sample of one state; the weights of all states have sum one.
     fn samples(&self, view: &StateView, f: &mut dyn FnMut(f64, f64));
     /// Adds the first derivatives of one state's samples, and their share of the curvature, to `out`:
     /// see [`Level::slope`] and [`Level::curvature`].
     fn accumulate(&self, view: &StateView, at: &StatesSensitivity, level: &Level, out: &mut Normal);
+}
+
+/// Which soft maximum of samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SoftForm {
+    /// S of the module.
+    #[default]
+    Monotone,
+    /// The paper's weighted mean; see `paper.rs`.
+    Paper,
 }
 
 /// Hands out samples (x, w).
@@ -37,10 +51,13 @@ fn largest(samples: &Samples) -> f64 {
 /// A soft maximum over the cycle, as its derivatives need it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Level {
-    /// S.
+    /// S, or the paper's.
     pub value: f64,
     /// β.
     pub beta: f64,
+    /// S in either form: w e^{β(x − base)} have sum one.
+    base: f64,
+    form: SoftForm,
 }
 
 impl Level {
@@ -51,22 +68,47 @@ impl Level {
 
     /// The soft maximum with β = 50/`reference`.
     pub fn new(term: &dyn Sampled, cycle: &[StateView], reference: f64) -> Self {
-        Self::of(&|f| cycle.iter().for_each(|view| term.samples(view, f)), reference)
+        Self::of(&|f| cycle.iter().for_each(|view| term.samples(view, f)), reference, term.form())
     }
 
     /// Of the samples (x ≥ 0, w) that `samples` hands out; 0 where there are none.
-    fn of(samples: &Samples, reference: f64) -> Self {
+    fn of(samples: &Samples, reference: f64, form: SoftForm) -> Self {
         let beta = SHARPNESS / reference.max(f64::MIN_POSITIVE.sqrt());
         let largest = largest(samples);
-        let mut sum = 0.0;
-        samples(&mut |x, w| sum += w * (beta * (x - largest)).exp());
-        Self { value: if sum > 0.0 { largest + sum.ln() / beta } else { 0.0 }, beta }
+        let (mut sum, mut moment) = (0.0, 0.0);
+        samples(&mut |x, w| {
+            let e = w * (beta * (x - largest)).exp();
+            sum += e;
+            moment += e * x;
+        });
+        if sum <= 0.0 {
+            return Self { value: 0.0, beta, base: 0.0, form };
+        }
+        let base = largest + sum.ln() / beta;
+        let value = match form {
+            SoftForm::Monotone => base,
+            SoftForm::Paper => moment / sum,
+        };
+        Self { value, beta, base, form }
     }
 
     /// ∂S/∂x of a sample; 0 where it does not matter.
     pub fn slope(&self, x: f64, w: f64) -> f64 {
-        let exponent = self.beta * (x - self.value);
+        match self.form {
+            SoftForm::Monotone => self.share(x, w),
+            SoftForm::Paper => self.share(x, w) * (1.0 + self.beta * (x - self.value)),
+        }
+    }
+
+    /// Part of a sample in the whole, Σ = 1; 0 where it does not matter.
+    fn share(&self, x: f64, w: f64) -> f64 {
+        let exponent = self.beta * (x - self.base);
         if exponent < NEGLIGIBLE { 0.0 } else { w * exponent.exp() }
+    }
+
+    /// A positive curvature by ∇x ∇xᵀ of a sample of the paper's form, whose own may be negative.
+    pub fn curvature_at(&self, x: f64, w: f64) -> f64 {
+        self.beta * self.share(x, w)
     }
 
     /// Factor of ∇x ∇xᵀ that belongs to a sample's slope: β ∂S/∂x. The rest of ∇²S, −β ∇S ∇Sᵀ, couples all
@@ -79,7 +121,7 @@ impl Level {
     /// Jensen's inequality the matrix stays positive semidefinite.
     pub fn complete(&self, weight: f64, total: &mut Normal) {
         total.cost = weight * self.value;
-        if weight <= 0.0 {
+        if weight <= 0.0 || self.form == SoftForm::Paper {
             return;
         }
         let factor = self.beta / weight;
@@ -96,7 +138,7 @@ mod tests {
     use super::*;
 
     fn soft(samples: &[(f64, f64)]) -> Level {
-        Level::of(&|f| samples.iter().for_each(|(x, w)| f(*x, *w)), 4.0)
+        Level::of(&|f| samples.iter().for_each(|(x, w)| f(*x, *w)), 4.0, SoftForm::Monotone)
     }
 
     #[test]
@@ -124,6 +166,30 @@ mod tests {
             let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
             assert!((difference - slope).abs() < 1e-8, "{i}: {difference} {slope}");
         }
+    }
+
+    #[test]
+    fn the_papers_form_is_the_weighted_mean_and_slopes_are_its_derivatives() {
+        let samples = [(4.0, 1.0), (3.8, 1.0), (3.0, 1.0), (3.9, 1.0)];
+        let paper = |samples: &[(f64, f64)]| {
+            Level::of(&|f| samples.iter().for_each(|(x, w)| f(*x, *w)), 4.0, SoftForm::Paper)
+        };
+        let level = paper(&samples);
+        let e = |x: f64| (50.0 / 4.0 * x).exp();
+        let (sum, moment) = samples.iter().fold((0.0, 0.0), |(s, m), (x, _)| (s + e(*x), m + x * e(*x)));
+        assert!((level.value - moment / sum).abs() < 1e-13);
+        for i in 0..4 {
+            let at = |h: f64| {
+                let mut moved = samples;
+                moved[i].0 += h;
+                paper(&moved).value
+            };
+            let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
+            let slope = level.slope(samples[i].0, 1.0);
+            assert!((difference - slope).abs() < 1e-8, "{i}: {difference} {slope}");
+        }
+        // What is wrong with it: a rising low value lowers it.
+        assert!(level.slope(3.8, 1.0) < 0.0);
     }
 
     #[test]

@@ -17,7 +17,7 @@ pub struct StressBelow {
 }
 
 /// One pascal: without a scale, stress counts in SI.
-const PASCAL_MPA: f64 = 1e-6;
+pub(super) const PASCAL_MPA: f64 = 1e-6;
 
 impl StressBelow {
     /// `scale_mpa` is the excess that counts as one.
@@ -64,19 +64,25 @@ impl Objective for StressBelow {
 }
 
 /// Sums in each rod's own directions first, chained to the design parameters once.
-struct OwnDirections<'a> {
+pub(super) struct OwnDirections<'a> {
     view: &'a StateView<'a>,
     at: &'a StatesSensitivity,
     rods: Vec<Option<Normal>>,
 }
 
 impl<'a> OwnDirections<'a> {
-    fn new(view: &'a StateView<'a>, at: &'a StatesSensitivity) -> Self {
+    pub(super) fn new(view: &'a StateView<'a>, at: &'a StatesSensitivity) -> Self {
         Self { view, at, rods: vec![None; view.model.rods.len()] }
     }
 
     /// Calls `f(sum of the rod, gradient of the stress at the sample)`.
-    fn with_row(&mut self, rod: usize, station: usize, point: usize, f: impl FnOnce(&mut Normal, &[f64])) {
+    pub(super) fn with_row(
+        &mut self,
+        rod: usize,
+        station: usize,
+        point: usize,
+        f: impl FnOnce(&mut Normal, &[f64]),
+    ) {
         let jacobian = &self.at.free.strains[rod];
         if let Some((_, d)) = jacobian.stress(&self.view.model.rods[rod].rod, station, point) {
             let mut row = [0.0; 12 + PARAMETERS];
@@ -86,7 +92,7 @@ impl<'a> OwnDirections<'a> {
         }
     }
 
-    fn chain(mut self, out: &mut Normal) {
+    pub(super) fn chain(mut self, out: &mut Normal) {
         for (normal, chain) in self.rods.iter_mut().zip(&self.at.free.directions) {
             if let Some(normal) = normal {
                 normal.complete();
@@ -108,16 +114,16 @@ impl StressPeak {
     pub fn new(scale_mpa: Option<f64>, weight: f64) -> Self {
         Self { name: "stress".to_string(), factor: weight / scale_mpa.unwrap_or(PASCAL_MPA) }
     }
+}
 
-    /// Calls `f(rod, station, point, stress, weight)` for every sample of a state.
-    fn for_each_sample(view: &StateView, mut f: impl FnMut(usize, usize, usize, f64, f64)) {
-        let share = view.share / STEPS_OF_WEIGHTS / (view.model.rods.len().max(1) * SECTION_POINTS) as f64;
-        for (index, (rod, strains)) in view.model.rods.iter().zip(&view.equilibrium.strains).enumerate() {
-            let weights = rod.rod.station_weights();
-            for (station, stresses) in rod.rod.stresses(strains).iter().enumerate() {
-                for (point, stress) in stresses.iter().enumerate() {
-                    f(index, station, point, *stress, share * weights[station]);
-                }
+/// Calls `f(rod, station, point, stress, weight)` for every sample of a state.
+pub(super) fn for_each_sample(view: &StateView, mut f: impl FnMut(usize, usize, usize, f64, f64)) {
+    let share = view.share / STEPS_OF_WEIGHTS / (view.model.rods.len().max(1) * SECTION_POINTS) as f64;
+    for (index, (rod, strains)) in view.model.rods.iter().zip(&view.equilibrium.strains).enumerate() {
+        let weights = rod.rod.station_weights();
+        for (station, stresses) in rod.rod.stresses(strains).iter().enumerate() {
+            for (point, stress) in stresses.iter().enumerate() {
+                f(index, station, point, *stress, share * weights[station]);
             }
         }
     }
@@ -133,12 +139,12 @@ impl Sampled for StressPeak {
     }
 
     fn samples(&self, view: &StateView, f: &mut dyn FnMut(f64, f64)) {
-        Self::for_each_sample(view, |_, _, _, stress, weight| f(stress, weight));
+        for_each_sample(view, |_, _, _, stress, weight| f(stress, weight));
     }
 
     fn accumulate(&self, view: &StateView, at: &StatesSensitivity, level: &Level, out: &mut Normal) {
         let mut own = OwnDirections::new(view, at);
-        Self::for_each_sample(view, |rod, station, point, stress, weight| {
+        for_each_sample(view, |rod, station, point, stress, weight| {
             let slope = level.slope(stress, weight);
             if slope > 0.0 {
                 let curvature = self.factor * level.curvature(slope);

@@ -1,11 +1,11 @@
 //! Lateral stability (Megaro et al. 2017, eq. 4): ½ Σ ‖z_t − z_t^load‖², the displacement of a traced point under
 //! a dead force with the drives held, summed over two forces normal to the path.
 //!
-//! The directions are those of the *conventional* path, so they do not move with the design: in-plane normal and
-//! binormal, for planar mechanisms the hinge axis as binormal.
+//! The directions are those of the *conventional* path, so they move with the design's geometry only: in-plane normal
+//! and binormal, for planar mechanisms the hinge axis as binormal.
 
-use super::{Objective, StateView, StatesSensitivity, point_rows};
-use crate::equilibrium::{Layout, PointForce};
+use super::{Objective, StateView, StatesSensitivity, trace_rows};
+use crate::equilibrium::{Layout, LayoutChange, LayoutTrace, PointForce, PointForceChange};
 use crate::ir::Design;
 use crate::optimize::Normal;
 use nalgebra::Vector3;
@@ -65,21 +65,16 @@ impl Objective for Sway {
     }
 
     fn accumulate(&self, view: &StateView, at: &StatesSensitivity, out: &mut Normal) {
-        let trace = &view.model.layout.traces[self.trace];
-        let rows = |equilibrium, sensitivity| {
-            point_rows(view.model, equilibrium, sensitivity, trace.body, &trace.rest)
-        };
-        let Some(free) = rows(view.equilibrium, &at.free) else { return };
+        let rows = |equilibrium, sensitivity| trace_rows(view.model, equilibrium, sensitivity, self.trace);
+        let free = rows(view.equilibrium, &at.free);
         self.for_each_case(view, |case, displacement| {
             let (Some(equilibrium), Some(sensitivity)) = (view.loaded.get(case), at.loaded.get(case)) else {
                 return;
             };
-            if let Some(loaded) = rows(equilibrium, sensitivity) {
-                let relative = loaded - &free;
-                for c in 0..3 {
-                    let row: Vec<f64> = relative.row(c).iter().copied().collect();
-                    out.add(self.factor * view.share, displacement[c], &row);
-                }
+            let relative = rows(equilibrium, sensitivity) - &free;
+            for c in 0..3 {
+                let row: Vec<f64> = relative.row(c).iter().copied().collect();
+                out.add(self.factor * view.share, displacement[c], &row);
             }
         });
     }
@@ -87,22 +82,53 @@ impl Objective for Sway {
 
 /// The two load cases of a trace: one force a state, normal and binormal of its conventional path.
 pub fn load_cases(design: &Design, layout: &Layout, trace: usize, force_n: f64) -> [Vec<PointForce>; 2] {
+    let t = &layout.traces[trace];
+    let normals = path_normals(&t.path, layout.closed, plane(design));
+    let force = |n: Vector3<f64>| PointForce { body: t.body, rest: t.rest, force_n: n * force_n };
+    [0, 1].map(|k| normals.iter().map(|n| force(n[k])).collect())
+}
+
+/// How they change with each of the layout's changes: per case, change and state.
+pub fn load_case_changes(
+    design: &Design,
+    layout: &Layout,
+    trace: usize,
+    force_n: f64,
+) -> [Vec<Vec<PointForceChange>>; 2] {
+    let path = &layout.traces[trace].path;
+    let mut out = [Vec::new(), Vec::new()];
+    for change in layout.changes.iter().flatten() {
+        let moved = &change.traces[trace];
+        let normals = moving_normals(path, &moved.path, layout.closed, plane(design));
+        for (k, case) in out.iter_mut().enumerate() {
+            let force = |n: &[Moving; 2]| PointForceChange { rest: moved.rest, force_n: n[k].rate * force_n };
+            case.push(normals.iter().map(force).collect());
+        }
+    }
+    out
+}
+
+/// Axis of a planar mechanism.
+fn plane(design: &Design) -> Option<Vector3<f64>> {
     let axis = Vector3::from(design.layers.axis);
     let planar = design.joints.iter().all(|j| Vector3::from(j.axis).cross(&axis).norm() < PARALLEL);
-    let LayoutTraceParts { body, rest, target } = parts(layout, trace);
-    let normals = path_normals(target, layout.closed, planar.then_some(axis));
-    [0, 1].map(|k| normals.iter().map(|n| PointForce { body, rest, force_n: n[k] * force_n }).collect())
+    planar.then_some(axis)
 }
 
-struct LayoutTraceParts<'l> {
-    body: usize,
-    rest: Vector3<f64>,
-    target: &'l [Vector3<f64>],
+/// The one load case of a stated direction.
+pub fn load_along(layout: &Layout, trace: usize, force_n: f64, along: [f64; 3]) -> Vec<PointForce> {
+    let LayoutTrace { body, rest, .. } = &layout.traces[trace];
+    let force_n = Vector3::from(along) * force_n;
+    vec![PointForce { body: *body, rest: *rest, force_n }; layout.states()]
 }
 
-fn parts(layout: &Layout, trace: usize) -> LayoutTraceParts<'_> {
-    let t = &layout.traces[trace];
-    LayoutTraceParts { body: t.body, rest: t.rest, target: &t.target }
+/// How it changes with each of the layout's changes: per change and state.
+pub fn load_along_change(layout: &Layout, trace: usize) -> Vec<Vec<PointForceChange>> {
+    let moved = |change: &LayoutChange| PointForceChange {
+        rest: change.traces[trace].rest,
+        force_n: Vector3::zeros(),
+    };
+    layout.changes.iter().flatten().map(|c| vec![moved(c); layout.states()]).collect()
 }
 
 /// Normal and binormal of a path at each of its points. Where the path stops or turns back the line of the
@@ -112,6 +138,67 @@ pub fn path_normals(
     closed: bool,
     axis: Option<Vector3<f64>>,
 ) -> Vec<[Vector3<f64>; 2]> {
+    let still = vec![Vector3::zeros(); path.len()];
+    moving_normals(path, &still, closed, axis).into_iter().map(|pair| pair.map(|n| n.value)).collect()
+}
+
+/// A vector and its derivative by a parameter.
+#[derive(Clone, Copy)]
+struct Moving {
+    value: Vector3<f64>,
+    rate: Vector3<f64>,
+}
+
+impl Moving {
+    fn fixed(value: Vector3<f64>) -> Self {
+        Self { value, rate: Vector3::zeros() }
+    }
+
+    fn turned_back(self) -> Self {
+        Self { value: -self.value, rate: -self.rate }
+    }
+
+    /// None below the length `least`.
+    fn unit(self, least: f64) -> Option<Self> {
+        let value = self.value.try_normalize(least)?;
+        Some(Self { value, rate: (self.rate - value * value.dot(&self.rate)) / self.value.norm() })
+    }
+
+    fn cross(self, other: Self) -> Self {
+        let rate = self.rate.cross(&other.value) + self.value.cross(&other.rate);
+        Self { value: self.value.cross(&other.value), rate }
+    }
+
+    /// The part normal to a unit vector.
+    fn beside(self, unit: Self) -> Self {
+        let along = self.value.dot(&unit.value);
+        let by_along = self.rate.dot(&unit.value) + self.value.dot(&unit.rate);
+        Self {
+            value: self.value - unit.value * along,
+            rate: self.rate - unit.rate * along - unit.value * by_along,
+        }
+    }
+
+    fn any_normal(self) -> Self {
+        let d = self.value;
+        let seed = if d.x.abs() <= d.y.abs().min(d.z.abs()) {
+            Vector3::x()
+        } else if d.y.abs() <= d.z.abs() {
+            Vector3::y()
+        } else {
+            Vector3::z()
+        };
+        self.cross(Self::fixed(seed)).unit(0.0).unwrap_or(Self::fixed(Vector3::x()))
+    }
+}
+
+/// [`path_normals`] of a path that moves by `rates`.
+fn moving_normals(
+    path: &[Vector3<f64>],
+    rates: &[Vector3<f64>],
+    closed: bool,
+    axis: Option<Vector3<f64>>,
+) -> Vec<[Moving; 2]> {
     let last = path.len().saturating_sub(1);
     let chord = |s: usize| {
         // A closed path's last point is its first.
@@ -129,37 +216,25 @@ pub fn path_normals(
         } else {
             last
         };
-        path[after] - path[before]
+        Moving { value: path[after] - path[before], rate: rates[after] - rates[before] }
     };
-    let chords: Vec<Vector3<f64>> = (0..path.len()).map(chord).collect();
-    let largest = chords.iter().map(|c| c.norm()).fold(0.0, f64::max);
-    let direction = |c: &Vector3<f64>| c.try_normalize(NO_DIRECTION * largest);
-    let any = any_normal(&axis.unwrap_or_else(Vector3::z));
+    let chords: Vec<Moving> = (0..path.len()).map(chord).collect();
+    let largest = chords.iter().map(|c| c.value.norm()).fold(0.0, f64::max);
+    let direction = |c: &Moving| c.unit(NO_DIRECTION * largest);
+    let any = Moving::fixed(axis.unwrap_or_else(Vector3::z)).any_normal();
     let mut tangent = chords.iter().find_map(direction).unwrap_or(any);
-    let mut binormal = axis.unwrap_or_else(|| any_normal(&tangent));
+    let mut binormal = axis.map_or_else(|| tangent.any_normal(), Moving::fixed);
     chords
         .iter()
         .map(|c| {
             if let Some(t) = direction(c) {
-                tangent = if t.dot(&tangent) < 0.0 { -t } else { t };
+                tangent = if t.value.dot(&tangent.value) < 0.0 { t.turned_back() } else { t };
             }
             // Carried along: the part of the former binormal that is normal to the new tangent.
-            let flat = binormal - tangent * tangent.dot(&binormal);
-            binormal = flat.try_normalize(1e-6).unwrap_or_else(|| any_normal(&tangent));
-            [binormal.cross(&tangent), binormal]
+            binormal = binormal.beside(tangent).unit(1e-6).unwrap_or_else(|| tangent.any_normal());
+            [binormal.cross(tangent), binormal]
         })
         .collect()
-}
-
-fn any_normal(d: &Vector3<f64>) -> Vector3<f64> {
-    let seed = if d.x.abs() <= d.y.abs().min(d.z.abs()) {
-        Vector3::x()
-    } else if d.y.abs() <= d.z.abs() {
-        Vector3::y()
-    } else {
-        Vector3::z()
-    };
-    d.cross(&seed).try_normalize(0.0).unwrap_or_else(Vector3::x)
 }
 
 #[cfg(test)]

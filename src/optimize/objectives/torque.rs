@@ -44,11 +44,20 @@ impl Sampled for Torque {
         if slope == 0.0 {
             return;
         }
-        let row = view.model.rows() - view.model.layout.drives.len() + self.drive;
-        let by_parameters: Vec<f64> =
-            at.free.lambda.row(row).iter().map(|l| -l / self.reference_n_mm).collect();
+        let by_parameters = relative_row(view, at, self.drive, self.reference_n_mm);
         // x = τ²: ∇x = 2τ∇τ, and 2∇τ∇τᵀ of its own curvature.
         let curvature = 2.0 * slope + level.curvature(slope) * 4.0 * torque * torque;
         out.add_model(self.weight * slope * 2.0 * torque, self.weight * curvature, &by_parameters);
     }
+}
+
+/// Derivatives of τ/τ₀ by the design parameters.
+pub(super) fn relative_row(
+    view: &StateView,
+    at: &StatesSensitivity,
+    drive: usize,
+    reference_n_mm: f64,
+) -> Vec<f64> {
+    let row = view.model.rows() - view.model.layout.drives.len() + drive;
+    at.free.lambda.row(row).iter().map(|l| -l / reference_n_mm).collect()
 }

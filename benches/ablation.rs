@@ -1,0 +1,297 @@
+//! The paper's comparisons on Chebyshev's linkage, as Markdown: the ablation of Fig. 8, where the time of an iteration
+//! goes (Table 1), L-BFGS against CMA-ES (section 5) and ours, and what the stress term does to the stress.
+//!
+//! `cargo bench --bench ablation [-- --steps N --iterations N --design FILE.mech]`. Another design needs a trace `tip`
+//! and a drive `motor`, as the example has. A row whose terms this version does not have says so.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+use flexura::elaborate::{FileError, Files, Options, elaborate};
+use flexura::equilibrium::{Layout, Model, SensitivityWorkspace, sweep};
+use flexura::ir::Design;
+use flexura::kinematics::solve_motion;
+use flexura::optimize::{Method, Problem, optimize};
+use flexura::pipeline::{Compiler, DriveMeasures, EDGES, Measures, Stages, measure};
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+/// The paper's terms with its weights (SI), one more a row.
+const ABLATION: &[&str] = &[
+    "track(tip)",
+    "track(tip), collision(gap = 0.5 mm)",
+    "track(tip), collision(gap = 0.5 mm), torque(motor, form = paper)",
+    "track(tip), collision(gap = 0.5 mm), torque(motor, form = paper), stress(form = paper)",
+];
+/// The same without collisions.
+const WITHOUT_COLLISION: &[&str] = &[
+    "track(tip), torque(motor, form = paper)",
+    "track(tip), torque(motor, form = paper), stress(form = paper)",
+];
+/// Our forms of the last.
+const OURS: &[&str] = &[
+    "track(tip, scale = 0.1 mm), stress(below = 25 MPa, scale = 0.2 MPa)",
+    "track(tip, scale = 0.1 mm), torque(motor), stress(below = 25 MPa, scale = 0.2 MPa)",
+];
+/// Repetitions of a timed piece; the least counts.
+const REPEAT: usize = 5;
+
+struct Arguments {
+    design: PathBuf,
+    steps: Option<usize>,
+    iterations: usize,
+}
+
+fn arguments() -> Arguments {
+    let example = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("examples/chebyshev/chebyshev.mech");
+    let mut out = Arguments { design: example, steps: None, iterations: 100 };
+    // cargo itself adds `--bench`.
+    let mut rest = std::env::args().skip(1).filter(|a| a != "--bench");
+    while let Some(name) = rest.next() {
+        let value = rest.next().unwrap_or_else(|| panic!("{name} needs a value"));
+        match name.as_str() {
+            "--design" => out.design = value.into(),
+            "--steps" => out.steps = Some(value.parse().expect("a number of steps")),
+            "--iterations" => out.iterations = value.parse().expect("a number of iterations"),
+            _ => panic!("there is no {name}: --design, --steps, --iterations"),
+        }
+    }
+    out
+}
+
+/// The design with other terms, nothing required and nothing exported.
+struct Variant {
+    folder: PathBuf,
+    name: String,
+    text: String,
+}
+
+impl Files for Variant {
+    fn read(&self, path: &str) -> Result<String, FileError> {
+        if path == self.name {
+            return Ok(self.text.clone());
+        }
+        std::fs::read_to_string(self.folder.join(path)).map_err(|_| FileError::NotFound)
+    }
+}
+
+/// The design with these terms, or why this version cannot have it.
+fn variant(arguments: &Arguments, terms: &str) -> Result<Design, String> {
+    let text = std::fs::read_to_string(&arguments.design).expect("the design can be read");
+    let from = text.find("    minimize {").expect("the design has a `minimize` block");
+    let to = from + text[from..].find("    }\n").expect("closed on a line of its own") + 6;
+    let kept = |part: &str| -> String {
+        let dropped =
+            |l: &&str| !(l.trim_start().starts_with("require") || l.trim_start().starts_with("export"));
+        part.lines().filter(dropped).map(|l| format!("{l}\n")).collect()
+    };
+    let text = format!("{}    minimize {{ {terms} }}\n{}", kept(&text[..from]), kept(&text[to..]));
+    let name = arguments.design.file_name().unwrap().to_str().unwrap().to_string();
+    let folder = arguments.design.parent().unwrap().to_path_buf();
+    let options = Options { steps: arguments.steps, ..Options::default() };
+    let out = elaborate(&name, &Variant { folder, name: name.clone(), text }, &options);
+    let first =
+        |d: &flexura::diagnostic::Diagnostic| d.is_error().then(|| format!("{} {}", d.code, d.message));
+    out.design.ok_or_else(|| out.diagnostics.iter().find_map(first).unwrap_or_default())
+}
+
+fn starts(design: &Design) -> Vec<f64> {
+    design.free.iter().map(|f| f.start).collect()
+}
+
+fn layout(design: &Design) -> Layout {
+    let start = starts(design);
+    Layout::new(design, &solve_motion(design, &start).expect("it can be assembled"), &start)
+}
+
+fn numbers(m: &Measures) -> String {
+    let t = &m.traces["tip"];
+    let torque = match m.drives["motor"] {
+        DriveMeasures::Torque { max_torque_n_mm: v } | DriveMeasures::Force { max_force_n: v } => v,
+    };
+    let gap = m.gap.least_mm.map_or("–".into(), |g| format!("{g:.2}"));
+    let stress = m.stress.max_mpa.unwrap_or(f64::NAN);
+    format!("{:.3} | {:.3} | {stress:.1} | {torque:.1} | {gap}", t.mean_error_mm, t.max_error_mm)
+}
+
+/// One row of the ablation; the measures for what follows.
+fn row(arguments: &Arguments, terms: &str) -> Option<Measures> {
+    let design = match variant(arguments, terms) {
+        Ok(design) => design,
+        Err(why) => {
+            println!("| {terms} | {why} | | | | | | |");
+            return None;
+        }
+    };
+    let compiler = Compiler { iterations: arguments.iterations, ..Compiler::default() };
+    let cancel = AtomicBool::new(false);
+    let began = Instant::now();
+    let solved = match compiler.optimize(&design, &starts(&design), &|_| (), &cancel) {
+        Ok(solved) => solved,
+        Err(why) => {
+            println!("| {terms} | {} | | | | | | |", why.first().map_or("", |d| &d.message));
+            return None;
+        }
+    };
+    let seconds = began.elapsed().as_secs_f64();
+    let values: Vec<f64> = design.free.iter().map(|f| solved.solution.values[&f.path]).collect();
+    let simulation = compiler.simulate(&design, &values).expect("the best point can be simulated");
+    let measures = measure(&design, &simulation);
+    let end = if solved.solution.converged { "" } else { " (limit)" };
+    println!("| {terms} | {} | {}{end} | {seconds:.1} |", numbers(&measures), solved.solution.iterations);
+    Some(measures)
+}
+
+fn ablation(arguments: &Arguments) {
+    println!("\n## Objectives (Fig. 8)\n");
+    println!(
+        "The paper's forms and weights, then ours; Levenberg–Marquardt, {} iterations at most.\n",
+        arguments.iterations
+    );
+    println!(
+        "| terms | mean error mm | largest error mm | largest stress MPa | largest torque N·mm | least gap mm | iterations | s |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
+    let design = variant(arguments, ABLATION[0]).expect("tracking alone is there");
+    let simulation =
+        Compiler::default().simulate(&design, &starts(&design)).expect("the start can be simulated");
+    println!("| start | {} | | |", numbers(&measure(&design, &simulation)));
+    let all: Vec<Option<Measures>> =
+        [ABLATION, WITHOUT_COLLISION, OURS].concat().iter().map(|terms| row(arguments, terms)).collect();
+    let stress = |m: &Option<Measures>| m.as_ref().and_then(|m| m.stress.max_mpa);
+    println!("\n## Stress\n");
+    println!(
+        "Largest stress over the cycle within the same bounds; the paper: less by more than ten times.\n"
+    );
+    println!("| without | with a stress term | MPa | MPa | less by |");
+    println!("| --- | --- | --- | --- | --- |");
+    let names = [ABLATION, WITHOUT_COLLISION, OURS].concat();
+    for (without, with) in [(0, 6), (2, 3), (4, 5), (4, 7)] {
+        if let (Some(a), Some(b)) = (stress(&all[without]), stress(&all[with])) {
+            println!("| {} | {} | {a:.1} | {b:.1} | {:.1} |", names[without], names[with], a / b);
+        }
+    }
+}
+
+/// Least time of a piece, s.
+fn least<T>(mut piece: impl FnMut() -> T) -> (f64, T) {
+    let mut timed = || {
+        let began = Instant::now();
+        let value = piece();
+        (began.elapsed().as_secs_f64(), value)
+    };
+    let mut best = timed();
+    for _ in 1..REPEAT {
+        let again = timed();
+        if again.0 < best.0 {
+            best = again;
+        }
+    }
+    best
+}
+
+fn shares(arguments: &Arguments) {
+    println!("\n## Where the time of an iteration goes (Table 1)\n");
+    println!(
+        "At the start of the design, on one thread, ms. Simulation: rods and the sweep of equilibria. Objectives: values and"
+    );
+    println!("their derivatives from those of the states; with `sway` its loaded equilibria too.\n");
+    println!(
+        "| terms | whole iteration | simulation | derivatives of states | objectives | objectives, share |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- |");
+    let all = [
+        ABLATION[0],
+        ABLATION[1],
+        ABLATION[3],
+        WITHOUT_COLLISION[1],
+        OURS[0],
+        "track(tip), sway(tip, force = 0.2 N)",
+    ];
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    for terms in all {
+        let design = match variant(arguments, terms) {
+            Ok(design) => design,
+            Err(why) => {
+                println!("| {terms} | {why} | | | | |");
+                continue;
+            }
+        };
+        let layout = layout(&design);
+        let start = starts(&design);
+        pool.install(|| {
+            let (simulation, (model, cycle)) = least(|| {
+                let model = Model::new(&design, &layout, &start, EDGES, true).expect("rods");
+                let cycle = sweep(&model).expect("equilibria");
+                (model, cycle)
+            });
+            let (states, ()) = least(|| {
+                let mut workspace = SensitivityWorkspace::new(&model);
+                for (s, e) in cycle.states.iter().take(layout.counted_states()).enumerate() {
+                    let target: Vec<f64> = layout.drives.iter().map(|d| d.values[s] - d.rest).collect();
+                    workspace.at(&model, e, &target).expect("derivatives");
+                }
+            });
+            let problem = Problem::new(&design, &layout, EDGES);
+            let x = problem.start();
+            let (whole, ()) = least(|| {
+                let trial = problem.simulate(&x).expect("the start can be simulated");
+                problem.differentiate(&trial).expect("and differentiated");
+            });
+            let objectives = (whole - simulation - states).max(0.0);
+            println!(
+                "| {terms} | {:.1} | {:.1} | {:.1} | {:.1} | {:.0} % |",
+                whole * 1e3,
+                simulation * 1e3,
+                states * 1e3,
+                objectives * 1e3,
+                100.0 * objectives / whole
+            );
+        });
+    }
+}
+
+fn solvers(arguments: &Arguments) {
+    const LIMIT: usize = 50;
+    println!("\n## Solvers, {LIMIT} iterations of tracking alone\n");
+    println!("Cost in parts of the start's; CMA-ES simulates a whole generation an iteration.\n");
+    println!("| solver | after 10 | after 25 | after {LIMIT} | cycles simulated | s |");
+    println!("| --- | --- | --- | --- | --- | --- |");
+    let design = variant(arguments, ABLATION[0]).expect("tracking alone is there");
+    let layout = layout(&design);
+    let methods = [
+        ("Levenberg–Marquardt", Method::LevenbergMarquardt),
+        ("L-BFGS", Method::Lbfgs),
+        ("CMA-ES", Method::CmaEs),
+    ];
+    for (name, method) in methods {
+        let costs: Mutex<Vec<(usize, f64)>> = Mutex::new(Vec::new());
+        let told = |i: &flexura::optimize::Iteration| costs.lock().unwrap().push((i.number, i.cost));
+        let cancel = AtomicBool::new(false);
+        let problem = Problem::new(&design, &layout, EDGES);
+        let first = problem.simulate(&problem.start()).expect("the start can be simulated").cost;
+        let began = Instant::now();
+        let found = optimize(problem, method, &starts(&design), LIMIT, &cancel, &told);
+        let seconds = began.elapsed().as_secs_f64();
+        let costs = costs.into_inner().unwrap();
+        let after = |n: usize| {
+            let until = costs.iter().filter(|(number, _)| *number <= n).map(|(_, c)| *c);
+            until.fold(f64::INFINITY, f64::min) / first
+        };
+        println!(
+            "| {name} | {:.1e} | {:.1e} | {:.1e} | {} | {seconds:.1} |",
+            after(10),
+            after(25),
+            found.cost / first,
+            found.simulations
+        );
+    }
+}
+
+fn main() {
+    let arguments = arguments();
+    println!("# {}", arguments.design.file_stem().unwrap().to_string_lossy());
+    ablation(&arguments);
+    shares(&arguments);
+    solvers(&arguments);
+}

@@ -1,0 +1,253 @@
+//! Ways of a link into another layer. Straight up where nothing is; beside what is in the way (a flexure at the very
+//! point of a pin) by a bar within the other layer and a riser that keeps clear of flexures and bodies as they move.
+//!
+//! While links are planned only the conventional motion is known: a bent flexure is taken half-way between where its
+//! two ends would carry it, and of other bodies their eyes, the bars between them and their stubs count. The gaps of the
+//! finished solids over the cycle are measured later.
+
+use super::anchor::Anchor;
+use super::distance::separation;
+use super::link::{
+    BAR_BELOW_MM, BOSS_BELOW_MM, Builder, ROUND_MM, Role, SAME_NODE_MM, SPREAD_MM, STUB_FREE_MM,
+    STUB_RADIUS_MM, spread,
+};
+use super::parts::{BodySolid, Eye, FlexureSolid};
+use super::slot::Slot;
+use crate::math::Pose;
+use nalgebra::{Rotation3, Unit, Vector3};
+use std::f64::consts::TAU;
+
+/// Radius of a riser beside something, as a part of a bar's half width.
+const SLIMMER: f64 = 0.75;
+/// Directions and distances at which a place for a riser is looked for, and the step of the latter, mm.
+const DIRECTIONS: usize = 48;
+const DISTANCES: usize = 24;
+const DISTANCE_STEP_MM: f64 = 1.5;
+/// A straight way is given up only if something would really be hit, by this, mm: what it is compared with is not exact.
+const OVERLAP_MM: f64 = 0.2;
+/// Next to its attachment a flexure is as near to its own link as it must be, mm.
+const OWN_ROOT_MM: f64 = 2.0;
+
+/// Something that moves beside a body, where it is in one state.
+pub(super) struct Near {
+    slot: Slot,
+    center: Vector3<f64>,
+    radius: f64,
+}
+
+impl Near {
+    fn new(slot: Slot) -> Self {
+        let (center, radius) = slot.bounding_sphere();
+        Self { slot, center, radius }
+    }
+}
+
+impl Builder<'_> {
+    /// Whether a slot of this body overlaps something in some state.
+    pub(super) fn meets_moving(&self, slot: &Slot) -> bool {
+        self.nearer_than(slot, -OVERLAP_MM, self.moving())
+    }
+
+    fn nearer_than<'n>(&self, slot: &Slot, gap_mm: f64, near: impl IntoIterator<Item = &'n Near>) -> bool {
+        let (center, radius) = slot.bounding_sphere();
+        near.into_iter().any(|n| {
+            (n.center - center).norm() - n.radius - radius < gap_mm
+                && separation(&n.slot, slot).gap_mm < gap_mm
+        })
+    }
+
+    /// Everything that moves, in every state, seen from this body.
+    fn moving(&self) -> &[Near] {
+        self.moving.get_or_init(|| {
+            let still = vec![vec![Pose::rest(Vector3::zeros()); self.input.bodies.len()]];
+            let states = if self.input.motion.is_empty() { &still } else { &self.input.motion };
+            let mut near = Vec::new();
+            for poses in states {
+                let Some(own) = poses.get(self.index) else { continue };
+                let seen: Vec<Pose> = poses.iter().map(|p| from(own, p)).collect();
+                for flexure in &self.input.flexures {
+                    near.extend(self.bent(flexure, &seen).into_iter().map(Near::new));
+                }
+                let others =
+                    self.input.bodies.iter().zip(&seen).enumerate().filter(|(b, _)| *b != self.index);
+                for (b, (body, pose)) in others {
+                    near.extend(self.rough(b, body).iter().map(|s| Near::new(s.moved(pose))));
+                }
+            }
+            near
+        })
+    }
+
+    /// A flexure as the motion of its two bodies bends it, about: near each end it follows the body there.
+    fn bent(&self, flexure: &FlexureSolid, seen: &[Pose]) -> Vec<Slot> {
+        let (Some(a), Some(b)) = (seen.get(flexure.bodies.0), seen.get(flexure.bodies.1)) else {
+            return Vec::new();
+        };
+        let slots = flexure.slots();
+        let count = slots.len().max(1) as f64;
+        let ends = [(flexure.bodies.0, false), (flexure.bodies.1, true)];
+        let root = |p: &Vector3<f64>| {
+            let own = ends.iter().filter(|(body, _)| *body == self.index);
+            own.clone().any(|(_, at_end)| (flexure.end_point(*at_end) - p).norm() < OWN_ROOT_MM)
+        };
+        let place = |p: &Vector3<f64>, u: f64| {
+            let w = u * u * (3.0 - 2.0 * u);
+            a.point(p).lerp(&b.point(p), w)
+        };
+        slots
+            .iter()
+            .enumerate()
+            .filter(|(_, s)| !root(&s.start) && !root(&s.end))
+            .map(|(i, s)| {
+                let (u, v) = (i as f64 / count, (i + 1) as f64 / count);
+                let axis = a.direction(&s.axis).lerp(&b.direction(&s.axis), u);
+                let axis = axis.try_normalize(1e-9).unwrap_or(s.axis);
+                Slot { start: place(&s.start, u), end: place(&s.end, v), axis, ..*s }
+            })
+            .collect()
+    }
+
+    /// Another body before it is planned: its eyes, the bars between those in its own layer, its stubs.
+    fn rough(&self, index: usize, body: &BodySolid) -> Vec<Slot> {
+        let mut slots = Vec::new();
+        for (i, eye) in body.eyes.iter().enumerate() {
+            let shape = self.eye_shape(eye);
+            let half = shape.half_height - BOSS_BELOW_MM;
+            slots.push(Slot::bar(shape.center, shape.center, eye.axis, shape.radius, half, ROUND_MM));
+            let Some(axis) = body.axis else { continue };
+            let on_level = |e: &Eye| (e.point.dot(&axis) - body.level_mm).abs() < self.half();
+            let raised = |p: &Vector3<f64>| p + axis * (body.level_mm - p.dot(&axis));
+            if !on_level(eye) {
+                // From its own layer straight to its eye.
+                let (low, high) =
+                    (eye.point.dot(&axis).min(body.level_mm), eye.point.dot(&axis).max(body.level_mm));
+                let middle = raised(&eye.point) + axis * ((low + high) / 2.0 - body.level_mm);
+                let reach = (high - low) / 2.0;
+                slots.push(Slot::bar(middle, middle, axis, shape.radius, reach, ROUND_MM));
+            }
+            for other in body.eyes.iter().skip(i + 1) {
+                let (p, q) = (raised(&eye.point), raised(&other.point));
+                let Some(along) = (q - p).try_normalize(1e-9) else { continue };
+                let trim =
+                    |e: &Eye| if on_level(e) { self.eye_shape(e).keep_out + self.bar_radius() } else { 0.0 };
+                let (from, to) = (trim(eye), (q - p).norm() - trim(other));
+                if from < to {
+                    let half = self.half() - BAR_BELOW_MM;
+                    let ends = (p + along * from, p + along * to);
+                    slots.push(Slot::bar(ends.0, ends.1, axis, self.bar_radius(), half, ROUND_MM));
+                }
+            }
+        }
+        for flexure in &self.input.flexures {
+            for (own, at_end) in [(flexure.bodies.0, false), (flexure.bodies.1, true)] {
+                if own != index {
+                    continue;
+                }
+                let (at, out) = (flexure.end_point(at_end), flexure.outward(at_end));
+                let radius = STUB_RADIUS_MM.max(flexure.end_axes(at_end).0);
+                let root = at + out * (STUB_FREE_MM + self.boss_radius());
+                slots.push(Slot::capsule(at, root, radius));
+                let Some(axis) = body.axis else { continue };
+                let level = flexure.joint_point.dot(&axis);
+                if (level - body.level_mm).abs() >= self.half() {
+                    let (low, high) = (level.min(body.level_mm), level.max(body.level_mm));
+                    let middle = root + axis * ((low + high) / 2.0 - root.dot(&axis));
+                    let reach = (high - low) / 2.0 + self.half() - BOSS_BELOW_MM;
+                    slots.push(Slot::bar(middle, middle, axis, self.boss_radius(), reach, ROUND_MM));
+                }
+            }
+        }
+        slots
+    }
+
+    /// The eyes that cannot be reached straight: each by an arm in its own share of its layer and a riser beside what
+    /// stands between.
+    pub(super) fn rise_beside(&mut self) {
+        let Some(body) = self.input.bodies.get(self.index) else { return };
+        let eyes: Vec<&Eye> = body.eyes.iter().filter(|e| self.risen.contains(&e.point)).collect();
+        for eye in eyes {
+            let shape = self.eye_shape(eye);
+            let level = shape.center.dot(&self.axis());
+            let half = shape.half_height - BOSS_BELOW_MM;
+            let radius = (SLIMMER * self.bar_radius()).max(STUB_RADIUS_MM);
+            let neck =
+                (shape.half_height - BAR_BELOW_MM - SPREAD_MM * spread(self.plan.slots.len())).max(0.1);
+            let axis = self.axis();
+            let arm =
+                |foot: &Vector3<f64>| Slot::bar(shape.center, *foot, axis, radius - 0.1, neck, ROUND_MM);
+            let span = (level - half, level + half);
+            match self.foot(&shape.center, span, radius, arm) {
+                Some(foot) => {
+                    self.push(Role::Bar, arm(&foot));
+                    self.column(Role::Riser, &foot, span, radius, &Anchor::Fixed);
+                    self.node(foot, None, Anchor::Fixed);
+                }
+                None => {
+                    self.plan.notes.push(format!(
+                        "`{}`: there is no free way to its pin at ({:.1}, {:.1}) mm.",
+                        body.name, eye.point.x, eye.point.y
+                    ));
+                    self.column(Role::Riser, &eye.point, span, shape.radius, &Anchor::Fixed);
+                    self.node(eye.point, None, Anchor::Fixed);
+                }
+            }
+        }
+    }
+
+    /// The best place for a riser near `from`: free in every state, together with the arm that leads there, and with
+    /// a short way to the body's nodes.
+    pub(super) fn foot(
+        &self,
+        from: &Vector3<f64>,
+        span: (f64, f64),
+        radius: f64,
+        arm: impl Fn(&Vector3<f64>) -> Slot,
+    ) -> Option<Vector3<f64>> {
+        let axis = self.axis();
+        let reach = DISTANCES as f64 * DISTANCE_STEP_MM + radius + self.input.clearance_mm;
+        let level = from.dot(&axis);
+        let far = |n: &&Near| {
+            let off = n.center - from;
+            (off - axis * off.dot(&axis)).norm() < reach + n.radius
+        };
+        let near: Vec<&Near> = self.moving().iter().filter(far).collect();
+        let first = super::slot::any_normal(&axis);
+        let mut places: Vec<(f64, Vector3<f64>)> = Vec::new();
+        for k in 0..DIRECTIONS {
+            let turn = TAU * k as f64 / DIRECTIONS as f64;
+            let out = Rotation3::from_axis_angle(&Unit::new_unchecked(axis), turn) * first;
+            for d in 1..=DISTANCES {
+                let way = d as f64 * DISTANCE_STEP_MM;
+                let place = from + out * way;
+                let there = self.at_level(&place, self.level);
+                let rest = self.nodes.iter().map(|n| (n.at - there).norm()).fold(f64::INFINITY, f64::min);
+                places.push((way + if rest.is_finite() { rest } else { 0.0 }, place));
+            }
+        }
+        places.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let gap = self.input.clearance_mm;
+        let free = |place: &Vector3<f64>| {
+            let column = self.column_slot(&self.at_level(place, level), span, radius);
+            let near = || near.iter().copied();
+            !self.nearer_than(&column, gap, near()) && !self.nearer_than(&arm(place), gap, near())
+        };
+        places.into_iter().map(|(_, p)| p).find(free)
+    }
+
+    /// Whether a place is one of those reached from beside.
+    pub(super) fn is_risen(&self, p: &Vector3<f64>) -> bool {
+        let axis = self.axis();
+        self.risen.iter().any(|q| {
+            let off = p - q;
+            (off - axis * off.dot(&axis)).norm() < SAME_NODE_MM
+        })
+    }
+}
+
+/// A pose seen from a body that has moved itself.
+fn from(own: &Pose, other: &Pose) -> Pose {
+    let back = own.rotation.transpose();
+    let zero = Vector3::zeros();
+    let moved = other.point(&zero) - own.point(&zero);
+    Pose { rotation: back * other.rotation, translation: back * moved, center: zero }
+}

@@ -1,0 +1,75 @@
+//! Loads on the mechanism from outside: dead forces, moments about an axis, the weight of its parts.
+
+use super::{BodyId, Design, ExprPoint, Origin, Profile};
+use serde::{Deserialize, Serialize};
+
+/// Sizes at t = 0 and t = 1 that agree to this part of the larger make the same pose.
+const SAME_SIZE: f64 = 1e-9;
+
+/// A load.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Load {
+    /// What acts, and on what.
+    pub kind: LoadKind,
+    /// Declaration.
+    pub origin: Origin,
+}
+
+/// What acts, and on what. Directions are unit vectors of the world and do not turn with the bodies.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LoadKind {
+    /// A force that keeps its direction.
+    Force {
+        /// The body.
+        body: BodyId,
+        /// Where it acts, in the drawing pose.
+        point: ExprPoint,
+        /// Its direction.
+        direction: [f64; 3],
+        /// Its size over the cycle, N.
+        size: Profile,
+    },
+    /// A moment that does the work size × (turn of the body about the axis).
+    Moment {
+        /// The body.
+        body: BodyId,
+        /// Its axis.
+        axis: [f64; 3],
+        /// Its size over the cycle, N·mm.
+        size: Profile,
+    },
+    /// The weight of links and flexures.
+    Gravity {
+        /// Where down is.
+        direction: [f64; 3],
+    },
+}
+
+impl Load {
+    /// Size at t in 0..1: N, N·mm, or 1 for gravity.
+    pub fn size(&self, t: f64) -> f64 {
+        match &self.kind {
+            LoadKind::Force { size, .. } | LoadKind::Moment { size, .. } => size.value(t),
+            LoadKind::Gravity { .. } => 1.0,
+        }
+    }
+
+    fn is_closed(&self) -> bool {
+        let (first, last) = (self.size(0.0), self.size(1.0));
+        (first - last).abs() <= SAME_SIZE * first.abs().max(last.abs())
+    }
+}
+
+impl Design {
+    /// Whether drives and loads are at t = 1 where they were at t = 0: the last state is then the first once more.
+    pub fn is_closed(&self) -> bool {
+        self.drives.iter().all(|d| d.is_closed()) && self.loads.iter().all(Load::is_closed)
+    }
+
+    /// Whether the conventional mechanism has a path of its own: without a drive it stands as drawn, and what moves the
+    /// compliant one are its loads.
+    pub fn is_driven(&self) -> bool {
+        !self.drives.is_empty()
+    }
+}

@@ -1,0 +1,244 @@
+//! What the term measures distances of: strips. A strip is a fan of capsules side by side: a piece of a flexure (an
+//! edge of its rod) or of a link (a slot of its skeleton), in world coordinates at a state.
+
+use super::kernel::{GAUSS_3, near};
+use crate::equilibrium::{Model, Sensitivity};
+use crate::geometry::SkeletonCapsule;
+use crate::math::{Pose, skew};
+use crate::rod::{RodState, SectionShape};
+use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
+
+/// Numbers a strip is made of: two ends, fan direction, spread, radius.
+pub const NUMBERS: usize = 11;
+
+/// A fan of capsules: axes `ends + fan · spread · ξ`, −1 ≤ ξ ≤ 1.
+#[derive(Clone, Copy, Debug)]
+pub struct Strip {
+    pub ends: [Vector3<f64>; 2],
+    pub fan: Vector3<f64>,
+    pub spread: f64,
+    pub radius: f64,
+    /// How many capsules stand for the fan.
+    pub copies: usize,
+    /// Whether it counts with its round ends: the pieces of a flexure do not, they go on.
+    pub capped: bool,
+}
+
+/// Derivatives by the numbers of a strip.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StripGradient {
+    pub ends: [Vector3<f64>; 2],
+    pub fan: Vector3<f64>,
+    pub spread: f64,
+    pub radius: f64,
+}
+
+impl StripGradient {
+    /// Adds `scale` times the gradient's own row J ᵀ g to `row`.
+    pub fn chain(&self, jacobian: &DMatrix<f64>, row: &mut DVector<f64>) {
+        let mut g = [0.0; NUMBERS];
+        for (to, v) in g.chunks_mut(3).zip([&self.ends[0], &self.ends[1], &self.fan]) {
+            to.copy_from_slice(v.as_slice());
+        }
+        (g[9], g[10]) = (self.spread, self.radius);
+        row.gemv_tr(1.0, jacobian, &DVector::from_column_slice(&g), 1.0);
+    }
+}
+
+impl Strip {
+    /// Length that counts: of a link's capsule over its round ends.
+    fn measure(&self) -> f64 {
+        (self.ends[1] - self.ends[0]).norm() + if self.capped { 2.0 * self.radius } else { 0.0 }
+    }
+
+    fn add_measure(&self, factor: f64, to: &mut StripGradient) {
+        if let Some(u) = (self.ends[1] - self.ends[0]).try_normalize(f64::MIN_POSITIVE.sqrt()) {
+            to.ends[1] += u * factor;
+            to.ends[0] -= u * factor;
+        }
+        if self.capped {
+            to.radius += 2.0 * factor;
+        }
+    }
+
+    /// Position of capsule number k in the fan, −1..1.
+    fn place(&self, k: usize) -> f64 {
+        if self.copies < 2 { 0.0 } else { 2.0 * k as f64 / (self.copies - 1) as f64 - 1.0 }
+    }
+
+    /// Places lengthwise, 0..1, with weights of sum one: panels no longer than the capsule is thick.
+    fn samples(&self) -> impl Iterator<Item = (f64, f64)> + use<> {
+        let length = (self.ends[1] - self.ends[0]).norm();
+        let panels =
+            if self.capped { ((length / (2.0 * self.radius)).ceil() as usize).clamp(1, 64) } else { 1 };
+        (0..panels).flat_map(move |k| {
+            GAUSS_3.map(|(x, w)| ((k as f64 + 0.5 * (1.0 + x)) / panels as f64, w / panels as f64))
+        })
+    }
+
+    /// Whether no two points of the strips' axes can be as near as `reach`.
+    pub fn far(&self, other: &Self, reach: f64) -> bool {
+        let half = |s: &Self, c: usize| 0.5 * (s.ends[1][c] - s.ends[0][c]).abs() + s.fan[c].abs() * s.spread;
+        let middle = |s: &Self, c: usize| 0.5 * (s.ends[0][c] + s.ends[1][c]);
+        (0..3).any(|c| (middle(self, c) - middle(other, c)).abs() >= half(self, c) + half(other, c) + reach)
+    }
+}
+
+/// Distance of a point from a segment, squared.
+fn square_distance(x: &Vector3<f64>, ends: &[Vector3<f64>; 2]) -> f64 {
+    let e = ends[1] - ends[0];
+    let s = ((x - ends[0]).dot(&e) / e.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    (ends[0] + e * s - x).norm_squared()
+}
+
+/// The penalty of two strips: the mean over both fans of the double integral over both lengths, mm², with its
+/// derivatives; none if it is zero.
+pub fn strips(a: &Strip, b: &Strip, gap_mm: f64) -> Option<(f64, [StripGradient; 2])> {
+    let reach = a.radius + b.radius + gap_mm;
+    if a.far(b, reach) {
+        return None;
+    }
+    let mut mean = 0.0;
+    let mut by = [StripGradient::default(); 2];
+    let share = 1.0 / (a.copies * b.copies) as f64;
+    let bound = (reach + a.spread + b.spread).powi(2);
+    for (s, weight) in a.samples() {
+        let on_axis = a.ends[0] * (1.0 - s) + a.ends[1] * s;
+        if square_distance(&on_axis, &b.ends) >= bound {
+            continue;
+        }
+        for i in 0..a.copies {
+            let xi = a.place(i);
+            let x = on_axis + a.fan * (a.spread * xi);
+            for k in 0..b.copies {
+                let eta = b.place(k);
+                let offset = b.fan * (b.spread * eta);
+                let ends = [b.ends[0] + offset, b.ends[1] + offset];
+                let Some(n) = near(&x, [&ends[0], &ends[1]], reach) else { continue };
+                let w = weight * share;
+                mean += w * n.value;
+                let [ga, gb] = &mut by;
+                ga.ends[0] += n.by_point * (w * (1.0 - s));
+                ga.ends[1] += n.by_point * (w * s);
+                ga.fan += n.by_point * (w * a.spread * xi);
+                ga.spread += w * xi * n.by_point.dot(&a.fan);
+                ga.radius += w * n.by_reach;
+                gb.ends[0] += n.by_ends[0] * w;
+                gb.ends[1] += n.by_ends[1] * w;
+                let moved = n.by_ends[0] + n.by_ends[1];
+                gb.fan += moved * (w * b.spread * eta);
+                gb.spread += w * eta * moved.dot(&b.fan);
+                gb.radius += w * n.by_reach;
+            }
+        }
+    }
+    if mean <= 0.0 {
+        return None;
+    }
+    let (la, lb) = (a.measure(), b.measure());
+    for g in &mut by {
+        let scale = la * lb;
+        g.ends.iter_mut().for_each(|e| *e *= scale);
+        g.fan *= scale;
+        g.spread *= scale;
+        g.radius *= scale;
+    }
+    a.add_measure(mean * lb, &mut by[0]);
+    b.add_measure(mean * la, &mut by[1]);
+    Some((mean * la * lb, by))
+}
+
+/// The edges of a rod between its attachment planes, the middles of its first and last edge. `half_widths` (a, b), mm.
+pub fn rod_strips(state: &RodState, shape: SectionShape, half_widths: [f64; 2], copies: usize) -> Vec<Strip> {
+    let last = state.m1.len() - 1;
+    let [a, b] = half_widths;
+    (0..=last)
+        .map(|j| {
+            let mut ends = [state.vertices[j], state.vertices[j + 1]];
+            let middle = (ends[0] + ends[1]) * 0.5;
+            let t = (ends[1] - ends[0]).normalize();
+            if j == 0 {
+                ends[0] = middle;
+            }
+            if j == last {
+                ends[1] = middle;
+            }
+            Strip {
+                ends,
+                fan: t.cross(&state.m1[j]),
+                spread: spread(shape, a, b),
+                radius: a,
+                copies,
+                capped: false,
+            }
+        })
+        .collect()
+}
+
+/// Half the width of a section's fan: inside an ellipse, round the corners of a rectangle.
+fn spread(shape: SectionShape, a: f64, b: f64) -> f64 {
+    match shape {
+        SectionShape::Ellipse => (b - a).max(0.0),
+        SectionShape::Rectangle => b,
+    }
+}
+
+/// Derivatives of the strip of edge `j` of rod `r` by the n design parameters, 11 × n.
+pub fn rod_jacobian(model: &Model, at: &Sensitivity, r: usize, j: usize) -> Option<DMatrix<f64>> {
+    let (rod, line) = (model.rods.get(r)?, at.centrelines.get(r)?);
+    let (first, second) = (line.vertices.get(j)?, line.vertices.get(j + 1)?);
+    let mut out = DMatrix::zeros(NUMBERS, first.ncols());
+    let middle = || (first + second) * 0.5;
+    let start = if j == 0 { middle() } else { first.clone() };
+    let end = if j + 2 == line.vertices.len() { middle() } else { second.clone() };
+    out.rows_mut(0, 3).copy_from(&start);
+    out.rows_mut(3, 3).copy_from(&end);
+    out.rows_mut(6, 3).copy_from(line.m2.get(j)?);
+    let (q, by_a, by_b) = (rod.rod.parameters(), rod.dq_dp.row(15), rod.dq_dp.row(16));
+    match rod.rod.options().section {
+        SectionShape::Ellipse if q.b > q.a => out.row_mut(9).copy_from(&(by_b - by_a)),
+        SectionShape::Ellipse => {}
+        SectionShape::Rectangle => out.row_mut(9).copy_from(&by_b),
+    }
+    out.row_mut(10).copy_from(&by_a);
+    Some(out)
+}
+
+/// A link's capsules at a pose.
+pub fn link_strip(capsule: &SkeletonCapsule, pose: &Pose) -> Strip {
+    let pairs = (capsule.spread_mm / (0.5 * capsule.radius_mm)).ceil().clamp(1.0, 16.0) as usize;
+    Strip {
+        ends: capsule.ends.map(|p| pose.point(&p)),
+        fan: pose.direction(&capsule.fan),
+        spread: capsule.spread_mm,
+        radius: capsule.radius_mm,
+        copies: if capsule.spread_mm > 0.0 { 1 + 2 * pairs } else { 1 },
+        capped: true,
+    }
+}
+
+/// Derivatives of a link's strip by the n design parameters, 11 × n.
+pub fn link_jacobian(
+    model: &Model,
+    at: &Sensitivity,
+    capsule: &SkeletonCapsule,
+    pose: &Pose,
+) -> DMatrix<f64> {
+    let n = at.links.ncols();
+    let mut out = DMatrix::zeros(NUMBERS, n);
+    let turned = |d: &Matrix3xX<f64>| pose.rotation * d;
+    let mut rows = [turned(&capsule.d_ends_dp[0]), turned(&capsule.d_ends_dp[1]), turned(&capsule.d_fan_dp)];
+    if let Some(first) = model.layout.bodies[capsule.body].first_dof {
+        let (du, dphi) = (at.links.rows(first, 3), at.links.rows(first + 3, 3));
+        for (row, end) in rows.iter_mut().zip(&capsule.ends) {
+            *row += du - skew(&pose.arm(end)) * dphi;
+        }
+        rows[2] -= skew(&pose.direction(&capsule.fan)) * dphi;
+    }
+    for (k, row) in rows.iter().enumerate() {
+        out.rows_mut(3 * k, 3).copy_from(row);
+    }
+    out.row_mut(9).copy_from(&capsule.d_spread_dp);
+    out.row_mut(10).copy_from(&capsule.d_radius_dp);
+    out
+}
