@@ -489,3 +489,22 @@ fn sketches_are_those_of_the_motors() {
     assert!(own[0].1.len() > 8 && own[0].1.iter().any(|n| *n != 0), "{own:?}");
     assert_eq!(own[1].1, own[0].1.iter().map(|n| -n).collect::<Vec<_>>());
 }
+
+/// Ground and arm in common, each half hanging on both by its flexures: one closed solid, its own mirror image.
+#[test]
+fn halves_with_a_moving_body_in_common_are_printed_as_one_part() {
+    // An arm so wide that the leaves of one half keep clear of the other.
+    let a = assembly(&CAR.replace("R = (14 mm, 24 mm)", "R = (20 mm, 24 mm)"));
+    let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
+    let (artefacts, found) = Compiler::default().parts(&a, &starts).unwrap();
+    assert_eq!(found, []);
+    let parts = meshes(&artefacts);
+    assert_eq!(parts.iter().map(|p| p.0.as_str()).collect::<Vec<_>>(), ["car_right_chassis.stl"]);
+    let facts = check_mesh(&parts[0].1);
+    assert!(facts.is_printable(), "{facts:?}");
+    assert!((facts.least.x + facts.largest.x).abs() < 1e-4);
+    // The shaft still passes the eyes of both halves (above the slot between them): 5 mm and the process's room.
+    let probe = Probe::new(&parts[0].1);
+    let width = probe.hollow_mm(&Vector3::new(0.0, 0.0, -9.3), &Vector3::new(1.0, 0.2, 0.0)).unwrap();
+    assert!((5.0..6.0).contains(&width), "{width}");
+}
