@@ -69,6 +69,12 @@ fn samples_of_the_manual_compile() {
         }
         assert_eq!(errors(&host), [""; 0], "{host}");
     }
+    // Mechanisms that place the design.
+    let instances = blocks(LANGUAGE, "mech instances");
+    assert!(!instances.is_empty());
+    for text in &instances {
+        assert_eq!(errors(&format!("{design}\n{text}")), [""; 0]);
+    }
     // Templates and records: used by the design in place of its own.
     let parts: String = whole[1..].concat();
     let own = design

@@ -13,7 +13,7 @@ fn findings(text: &str) -> Vec<Diagnostic> {
     let compiler = Compiler { iterations: 1, ..Compiler::default() };
     let checked = compiler.check("main.mech", &[], Some(12), &files);
     let mut found = checked.diagnostics;
-    let Some(design) = checked.design else { return found };
+    let Some(design) = checked.assembly.as_ref().and_then(|a| a.single()).cloned() else { return found };
     let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
     match compiler.simulate(&design, &start) {
         Ok(simulation) => found.extend(simulation.diagnostics),

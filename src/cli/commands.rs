@@ -31,9 +31,9 @@ pub fn check(common: &Common) -> u8 {
     opened.name_as_written(&mut out.sources);
     render::report(&out.diagnostics, &out.sources, common.format);
     if common.format == Format::Human {
-        match (&out.design, render::counts(&out.diagnostics)) {
-            (Some(design), counts) if counts.is_empty() => {
-                print(&format!("{}: no errors\n", design.name));
+        match (&out.assembly, render::counts(&out.diagnostics)) {
+            (Some(assembly), counts) if counts.is_empty() => {
+                print(&format!("{}: no errors\n", assembly.name));
             }
             (_, counts) => tell(&format!("{}: {counts}\n", common.source.display())),
         }
@@ -49,11 +49,15 @@ pub fn ir(common: &Common) -> u8 {
     };
     let mut out = pipeline::check(&opened.request, &Compiler::default(), &opened.folder);
     opened.name_as_written(&mut out.sources);
-    match &out.design {
+    match &out.assembly {
         // The output is the design: findings go to the standard error in either format.
-        Some(design) => {
+        Some(assembly) => {
             render::show(&out.diagnostics, &out.sources);
-            match serde_json::to_string_pretty(design) {
+            let text = match assembly.single() {
+                Some(design) => serde_json::to_string_pretty(design),
+                None => serde_json::to_string_pretty(assembly),
+            };
+            match text {
                 Ok(text) => print(&format!("{text}\n")),
                 Err(e) => {
                     tell(&format!("error: {e}\n"));
@@ -147,7 +151,7 @@ fn finish_build(out: BuildOutcome, format: Format, written: &[(String, usize)]) 
     match format {
         Format::Human => {
             render::show(&out.diagnostics, &out.sources);
-            match &out.design {
+            match &out.assembly {
                 Some(_) => {
                     print(&human::report(&out, written, Style::stdout()));
                 }
@@ -164,7 +168,7 @@ fn finish_build(out: BuildOutcome, format: Format, written: &[(String, usize)]) 
 /// The object that scripts rely on.
 fn json(out: &BuildOutcome) -> serde_json::Value {
     serde_json::json!({
-        "design_parameters": out.design.as_ref().map(|d| d.free.len()),
+        "design_parameters": out.assembly.as_ref().map(|a| a.designs.iter().map(|d| d.free.len()).sum::<usize>()),
         "iterations": out.solution.as_ref().map(|s| s.iterations),
         "before": out.before,
         "after": out.after,

@@ -1,24 +1,15 @@
 //! What a build tells a person: short, aligned, the numbers that matter first.
 
 use super::style::Style;
+use flexura::ir::Assembly;
 use flexura::pipeline::{BuildOutcome, Measures, Origin};
 use std::fmt::Write;
 
 /// The report of a build; `written` are the files with their sizes in bytes.
 pub fn report(out: &BuildOutcome, written: &[(String, usize)], style: Style) -> String {
     let mut text = String::new();
-    if let Some(design) = &out.design {
-        let joints = design.joints.iter().filter(|j| j.is_compliant()).count();
-        let _ = writeln!(
-            text,
-            "{}  {}, {} flexible of {}, {}, {}",
-            style.bold(&design.name),
-            count(design.bodies.len(), "body", "bodies"),
-            joints,
-            count(design.joints.len(), "joint", "joints"),
-            count(design.rods.len(), "rod", "rods"),
-            count(design.free.len(), "free variable", "free variables"),
-        );
+    if let Some(assembly) = &out.assembly {
+        heading(&mut text, assembly, style);
     }
     if let Some(solution) = &out.solution {
         let how = match out.solved_from {
@@ -35,7 +26,7 @@ pub fn report(out: &BuildOutcome, written: &[(String, usize)], style: Style) -> 
         let end = if solution.converged { "converged" } else { "not converged" };
         let _ = writeln!(text, "solved  {how}, {end}");
     }
-    measures(&mut text, out.before.as_ref(), out.after.as_ref(), style);
+    measures(&mut text, out, style);
     if let Some(after) = &out.after {
         let rests = super::released::released(&after.stability);
         if !rests.is_empty() {
@@ -53,10 +44,51 @@ pub fn report(out: &BuildOutcome, written: &[(String, usize)], style: Style) -> 
     text
 }
 
-fn measures(text: &mut String, before: Option<&Measures>, after: Option<&Measures>, style: Style) {
+/// What is built: the mechanism, or every design with its instances.
+fn heading(text: &mut String, assembly: &Assembly, style: Style) {
+    let single = assembly.single().is_some();
+    if !single {
+        let (i, d) = (assembly.instances.len(), assembly.designs.len());
+        let solved = count(d, "design", "designs");
+        let _ = writeln!(
+            text,
+            "{}  {} of {solved}",
+            style.bold(&assembly.name),
+            count(i, "instance", "instances")
+        );
+    }
+    for (k, design) in assembly.designs.iter().enumerate() {
+        let joints = design.joints.iter().filter(|j| j.is_compliant()).count();
+        let _ = write!(
+            text,
+            "{}  {}, {} flexible of {}, {}, {}",
+            if single { style.bold(&design.name) } else { format!("  {}", design.name) },
+            count(design.bodies.len(), "body", "bodies"),
+            joints,
+            count(design.joints.len(), "joint", "joints"),
+            count(design.rods.len(), "rod", "rods"),
+            count(design.free.len(), "free variable", "free variables"),
+        );
+        let of: Vec<&str> =
+            assembly.instances.iter().filter(|i| i.design == k).map(|i| i.name.as_str()).collect();
+        let _ = if single { writeln!(text) } else { writeln!(text, ": {}", of.join(", ")) };
+    }
+}
+
+/// Whether an instance does what an earlier one of the same design does: its numbers are the same.
+fn repeated(out: &BuildOutcome, name: &str) -> bool {
+    let Some(assembly) = out.assembly.as_ref().filter(|a| a.single().is_none()) else { return false };
+    let instance = name.split_once('.').map_or("", |n| n.0);
+    let at = assembly.instances.iter().position(|i| i.name == instance);
+    let Some((at, own)) = at.and_then(|k| Some((k, assembly.instances.get(k)?))) else { return false };
+    assembly.instances.iter().take(at).any(|i| i.design == own.design)
+}
+
+fn measures(text: &mut String, out: &BuildOutcome, style: Style) {
+    let (before, after) = (out.before.as_ref(), out.after.as_ref());
     let Some(result) = after.or(before) else { return };
     let mut rows: Vec<(String, Option<f64>, Option<f64>, &str)> = Vec::new();
-    for name in result.traces.keys() {
+    for name in result.traces.keys().filter(|n| !repeated(out, n)) {
         let of = |m: Option<&Measures>| m.and_then(|m| m.traces.get(name)).cloned();
         let (b, a) = (of(before), of(after));
         let mean = |t: &Option<flexura::pipeline::TraceMeasures>| t.as_ref().map(|t| t.mean_error_mm);
@@ -64,7 +96,7 @@ fn measures(text: &mut String, before: Option<&Measures>, after: Option<&Measure
         rows.push((format!("{name}, mean error"), mean(&b), mean(&a), "mm"));
         rows.push((format!("{name}, largest error"), most(&b), most(&a), "mm"));
     }
-    for name in result.directions.keys() {
+    for name in result.directions.keys().filter(|n| !repeated(out, n)) {
         let of = |m: Option<&Measures>| m.and_then(|m| m.directions.get(name)).cloned();
         let (b, a) = (of(before), of(after));
         let mean = |d: &Option<flexura::pipeline::DirectionMeasures>| d.as_ref().map(|d| d.mean_error_deg);
@@ -72,11 +104,11 @@ fn measures(text: &mut String, before: Option<&Measures>, after: Option<&Measure
         rows.push((format!("{name}, mean error"), mean(&b), mean(&a), "deg"));
         rows.push((format!("{name}, largest error"), most(&b), most(&a), "deg"));
     }
-    for name in result.outputs.keys() {
+    for name in result.outputs.keys().filter(|n| !repeated(out, n)) {
         let of = |m: Option<&Measures>| m.and_then(|m| m.outputs.get(name)).map(|o| o.span_deg);
         rows.push((format!("{name}, span"), of(before), of(after), "deg"));
     }
-    for (name, drive) in &result.drives {
+    for (name, drive) in result.drives.iter().filter(|(n, _)| !repeated(out, n)) {
         let of = |m: Option<&Measures>| m.and_then(|m| m.drives.get(name)).map(|d| d.parts().1);
         let (what, _, unit) = drive.parts();
         rows.push((format!("{name}, {what}"), of(before), of(after), unit));

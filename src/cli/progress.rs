@@ -58,6 +58,10 @@ impl Progress for Terminal {
         });
     }
 
+    fn design(&self, name: &str) {
+        self.bar.println(name);
+    }
+
     fn iteration(&self, iteration: &Iteration) {
         let [heading, line] = iteration_lines(iteration, self.seconds());
         if iteration.number == 0 {

@@ -7,7 +7,7 @@ use super::scope::LocalKind;
 use super::sheet::{Sheet, TraceText};
 use super::structure::Structure;
 use crate::diagnostic::{Diagnostic, Origin};
-use crate::ir::{Aims, BodyAngle, Direction};
+use crate::ir::{Aims, BodyAngle, Design, Direction};
 use crate::syntax::ast::{Argument, Expr, ExprKind, Ident};
 use std::collections::BTreeMap;
 
@@ -28,6 +28,22 @@ pub(super) struct AimNames {
     pub made: Aims,
 }
 
+impl AimNames {
+    /// Those of a placed design.
+    pub fn of(design: &Design) -> Self {
+        let outputs = design.aims.angles.iter().enumerate().filter_map(|(i, a)| Some((a.name.clone()?, i)));
+        let directions = design.aims.directions.iter().enumerate().map(|(i, d)| (d.name.clone(), i));
+        Self {
+            bodies: design.bodies.iter().enumerate().map(|(i, b)| (b.name.clone(), i)).collect(),
+            traces: design.traces.iter().enumerate().map(|(i, t)| (t.name.clone(), i)).collect(),
+            directions: directions.collect(),
+            outputs: outputs.collect(),
+            steps: Some(design.cycle.steps),
+            made: design.aims.clone(),
+        }
+    }
+}
+
 impl<'a> Evaluator<'a> {
     /// Directions, outputs and targets of a mechanism.
     pub(super) fn aims(
@@ -39,7 +55,8 @@ impl<'a> Evaluator<'a> {
         steps: Option<usize>,
         outside: &Outside<'_>,
     ) {
-        self.aims = AimNames { bodies: s.body_index.clone(), traces: traces.clone(), steps, ..AimNames::default() };
+        self.aims =
+            AimNames { bodies: s.body_index.clone(), traces: traces.clone(), steps, ..AimNames::default() };
         for text in &sheet.directions {
             if let Ok(d) = self.traced_direction(scope, text) {
                 self.aims.directions.insert(d.name.clone(), self.aims.made.directions.len());

@@ -75,6 +75,9 @@ codes! {
     DRUM "E0444" "a motor on something that slides without a drum, or a drum without need";
     TARGET "E0450" "a target that is no path";
     EMPHASIS "E0451" "an emphasis that is negative, or zero all over the cycle";
+    CYCLES_DIFFER "E0460" "instances whose cycles differ";
+    SHARED "E0461" "a body that a mirrored instance cannot share";
+    MIXED "E0462" "one body of two materials or processes";
     LATER_STATEMENT "E0901" "a statement that is not available yet";
     LATER_TERM "E0902" "an objective, query, export or function that is not available yet";
     LATER_JOINT "E0903" "a kind of joint that is not available yet";

@@ -128,7 +128,7 @@ impl<'a> Evaluator<'a> {
                 self.record_named(module, name, "motor").and_then(|item| self.motor(item).map(Some))
             }
         };
-        let drum = text.drum.map(|e| self.drum(scope, e)).transpose();
+        let drum = text.drum.map(|e| self.unscaled(|s| s.drum(scope, e))).transpose();
         let (on, unit, profile, motor, drum_radius_mm) = (on?, unit?, profile?, motor?, drum?);
         if let Some(first) = before.iter().find(|d| d.on == on) {
             return self.fail(

@@ -92,6 +92,10 @@ pub struct Evaluator<'a> {
     pub(super) sliders: BTreeSet<String>,
     /// Values of all nodes at the start values of the free variables, and those start values.
     pub(super) starts: (Vec<f64>, Vec<f64>),
+    /// Drawn lengths are multiplied by this (`place … scale = k`) …
+    pub(super) scale: f64,
+    /// … but not what is evaluated while this is set: records, bought parts, goals.
+    pub(super) as_is: bool,
 }
 
 impl<'a> Evaluator<'a> {
@@ -119,6 +123,8 @@ impl<'a> Evaluator<'a> {
             cables: BTreeSet::new(),
             sliders: BTreeSet::new(),
             starts: (Vec::new(), Vec::new()),
+            scale: 1.0,
+            as_is: false,
         }
     }
 
@@ -244,7 +250,7 @@ impl<'a> Evaluator<'a> {
             let next = u.dimension.power(part.exponent).and_then(|d| dim.times(d));
             dim = self.dimension(next, at)?;
         }
-        let id = self.constant(value * factor, at)?;
+        let id = self.constant(value * factor * self.drawn(dim), at)?;
         Ok(Value::Scalar(Scalar { id, dim }))
     }
 

@@ -124,7 +124,7 @@ impl<'a> Evaluator<'a> {
         clearance_mm: Option<f64>,
     ) -> Outcome<Layers> {
         let height_mm = match sheet.height {
-            None => DEFAULT_HEIGHT_MM,
+            None => DEFAULT_HEIGHT_MM * self.scale,
             Some((e, _)) => {
                 let v = self.eval_fixed(scope, e, Dimension::LENGTH, "the links' height")?;
                 if v <= 0.0 {

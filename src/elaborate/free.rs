@@ -70,7 +70,7 @@ impl<'a> Evaluator<'a> {
             let id = self.eval_scalar_settings(env.scope, fixed, dim)?;
             return Ok(Value::Scalar(Scalar { id, dim }));
         }
-        let [start_value, lower_value, upper_value] = bounds;
+        let [start_value, lower_value, upper_value] = self.scaled_start(bounds);
         if lower_value >= upper_value {
             return self.fail(
                 Diagnostic::error(

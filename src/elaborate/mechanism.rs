@@ -33,16 +33,7 @@ impl<'a> Evaluator<'a> {
         let scope = self.scope(module);
         let mut sheet = self.sheet(scope, m);
         sheet.broken |= self.program.modules.get(module).is_some_and(|m| m.broken);
-        for i in 0..self.scopes.get(scope).map_or(0, |s| s.locals.len()) {
-            let local = self.scopes.get(scope).and_then(|s| s.locals.get(i));
-            let Some(at) =
-                local.filter(|l| !matches!(l.kind, super::scope::LocalKind::Thing(_))).map(|l| l.at)
-            else {
-                continue;
-            };
-            // Errors have been reported; the rest of the mechanism is looked at all the same.
-            let _ = self.force(scope, i, at);
-        }
+        self.force_all(scope);
         let material = match sheet.material {
             Some((name, _)) => {
                 self.record_named(module, name, "material").and_then(|item| self.material(item)).ok()
@@ -87,6 +78,8 @@ impl<'a> Evaluator<'a> {
         self.aims(scope, &sheet, &s, &trace_index, cycle.as_ref().map(|c| c.steps), outside);
         let driven = drive_names(&drives, &sheet);
         let named = Named { traces: &trace_index, driven: &driven, drives: drives.as_deref() };
+        // Goals do not grow with the drawing.
+        self.as_is = true;
         let mut objectives = Vec::new();
         for term in sheet.minimize.map(|(terms, _)| terms).unwrap_or_default() {
             objectives.extend(self.objective(scope, term, &named));
@@ -100,6 +93,7 @@ impl<'a> Evaluator<'a> {
         for e in &sheet.exports {
             exports.extend(self.export(scope, e, &driven, &sheet.drives));
         }
+        self.as_is = false;
         if self.out.iter().any(Diagnostic::is_error) {
             return None;
         }
@@ -127,6 +121,20 @@ impl<'a> Evaluator<'a> {
         };
         self.finish(&mut design)?;
         Some(design)
+    }
+
+    /// Evaluates every name of a scope.
+    pub(super) fn force_all(&mut self, scope: usize) {
+        for i in 0..self.scopes.get(scope).map_or(0, |s| s.locals.len()) {
+            let local = self.scopes.get(scope).and_then(|s| s.locals.get(i));
+            let Some(at) =
+                local.filter(|l| !matches!(l.kind, super::scope::LocalKind::Thing(_))).map(|l| l.at)
+            else {
+                continue;
+            };
+            // Errors have been reported; the rest of the mechanism is looked at all the same.
+            let _ = self.force(scope, i, at);
+        }
     }
 
     /// Reports a statement that every mechanism needs.
@@ -235,7 +243,7 @@ fn drive_names(drives: &Option<Vec<Drive>>, sheet: &Sheet<'_>) -> BTreeMap<Strin
     }
 }
 
-fn quote(sources: &SourceMap, at: Origin) -> String {
+pub(super) fn quote(sources: &SourceMap, at: Origin) -> String {
     let text =
         sources.files.get(at.file as usize).and_then(|f| f.text.get(at.start as usize..at.end as usize));
     text.unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")

@@ -16,16 +16,21 @@ mod free;
 mod functions;
 mod goals;
 mod graph;
+mod instances;
 mod load;
 mod loads;
 mod lookup;
 mod mechanism;
 mod members;
+mod mirroring;
 mod names;
 mod places;
+mod placing;
 mod profiles;
+mod queries;
 mod records;
 mod require;
+mod scaling;
 mod scope;
 mod settings;
 mod sheet;
@@ -41,8 +46,8 @@ pub mod units;
 mod value;
 
 use crate::diagnostic::{Diagnostic, Origin, SourceMap};
-use crate::ir::Design;
-use crate::syntax::ast::Item;
+use crate::ir::{Assembly, Design};
+use crate::syntax::ast::{Item, Mechanism};
 pub use load::std_modules;
 use settings::Settings;
 use std::fmt;
@@ -104,7 +109,9 @@ pub struct Options {
 /// What [`elaborate`] gives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Elaborated {
-    /// The design; none when there are errors.
+    /// What the file builds; none when there are errors.
+    pub assembly: Option<Assembly>,
+    /// Its design, if it is one mechanism that places no others.
     pub design: Option<Design>,
     /// Every text that was read: the root file first, then imports, then `--set` values.
     pub sources: SourceMap,
@@ -112,55 +119,52 @@ pub struct Elaborated {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Reads `root` and what it imports, and elaborates it. The design is the *last* mechanism of the root
-/// file; the others are checked too.
+/// Reads `root` and what it imports, and elaborates it. What is built is the *last* mechanism of the root file that
+/// no other one places; the others are checked too.
 pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated {
     let mut sources = SourceMap::default();
     let mut diagnostics = Vec::new();
     let program = load::load(root, files, &mut sources, &mut diagnostics);
     let settings = Settings::parse(&options.set, &mut sources, &mut diagnostics);
     let Some(module) = program.root.and_then(|i| Some((i, program.modules.get(i)?))) else {
-        return Elaborated { design: None, sources, diagnostics };
+        return Elaborated { assembly: None, design: None, sources, diagnostics };
     };
     let (root_index, root_module) = module;
-    let mut evaluator = eval::Evaluator::new(&program, &settings);
     let outside = mechanism::Outside { module: root_index, steps: options.steps, sources: &sources, files };
-    let mut mechanisms: Vec<_> = root_module
-        .file
-        .items
-        .iter()
-        .filter_map(|i| match i {
-            Item::Mechanism(m) => Some(m),
-            _ => None,
-        })
-        .collect();
-    let last = mechanisms.pop();
+    let circular = placing::circles(&program, root_index, &mut diagnostics);
+    let (mut assembly, mut used) = (None, std::collections::BTreeSet::new());
     let no_settings = Settings::default();
-    for other in mechanisms {
-        let mut checker = eval::Evaluator::new(&program, &no_settings);
-        checker.mechanism(other, &outside);
-        evaluator.used.append(&mut checker.used);
-        diagnostics.append(&mut checker.out);
-    }
-    let mut design = None;
-    match last {
-        Some(m) => {
-            design = evaluator.mechanism(m, &outside);
-            evaluator.unused_settings();
+    let (built, others) = roles(&program, root_index);
+    for (m, is_root) in others.into_iter().map(|m| (m, false)).chain(built.map(|m| (m, true))) {
+        let settings = if is_root { &settings } else { &no_settings };
+        let mut found = if instances::is_assembly(m) {
+            instances::assemble(&program, settings, m, &outside, is_root)
+        } else {
+            let mut evaluator = eval::Evaluator::new(&program, settings);
+            let design = evaluator.mechanism(m, &outside);
+            if is_root {
+                evaluator.unused_settings();
+            }
+            let (out, used) = (evaluator.out, evaluator.used);
+            instances::Assembled { assembly: design.map(Assembly::of), out, used }
+        };
+        used.append(&mut found.used);
+        diagnostics.append(&mut found.out);
+        if is_root {
+            assembly = found.assembly;
         }
-        None if !root_module.broken => diagnostics.push(
+    }
+    if built.is_none() && !root_module.broken {
+        diagnostics.push(
             Diagnostic::error(
                 codes::NO_MECHANISM,
                 format!("`{root}` declares no mechanism"),
                 Origin { file: 0, start: 0, end: 0 },
             )
             .help("a design is a `mechanism NAME { … }`; materials and flexures alone are for importing"),
-        ),
-        None => {}
+        );
     }
-    let used = std::mem::take(&mut evaluator.used);
-    diagnostics.append(&mut evaluator.out);
-    if !diagnostics.iter().any(Diagnostic::is_error) {
+    if !circular && !diagnostics.iter().any(Diagnostic::is_error) {
         for (u, text) in root_module.file.uses.iter().enumerate() {
             if root_module.imported.get(u) == Some(&true) && !used.contains(&(root_index, u)) {
                 diagnostics.push(
@@ -170,10 +174,34 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
             }
         }
     } else {
-        design = None;
+        assembly = None;
     }
     tidy(&mut diagnostics);
-    Elaborated { design, sources, diagnostics }
+    let design = assembly.as_ref().and_then(Assembly::single).cloned();
+    Elaborated { assembly, design, sources, diagnostics }
+}
+
+/// What a file builds, and the mechanisms that have to be checked by themselves because it does not place them.
+fn roles(program: &load::Program, module: usize) -> (Option<&Mechanism>, Vec<&Mechanism>) {
+    let items = program.modules.get(module).map(|m| m.file.items.as_slice()).unwrap_or_default();
+    let mechanisms: Vec<(usize, &Mechanism)> = items
+        .iter()
+        .enumerate()
+        .filter_map(|(i, item)| match item {
+            Item::Mechanism(m) => Some((i, m)),
+            _ => None,
+        })
+        .collect();
+    let placed = |by: usize| placing::placed_by(program, (module, by)).into_iter().map(|(item, _)| item);
+    let in_use: std::collections::BTreeSet<(usize, usize)> =
+        mechanisms.iter().flat_map(|(i, _)| placed(*i)).collect();
+    let free = mechanisms.iter().rev().find(|(i, _)| !in_use.contains(&(module, *i)));
+    let Some((built, m)) = free.or(mechanisms.last()) else { return (None, Vec::new()) };
+    let own: std::collections::BTreeSet<(usize, usize)> = placed(*built).collect();
+    // One that is made of others cannot be placed yet: nobody has looked at it.
+    let seen = |i: usize, m: &Mechanism| own.contains(&(module, i)) && !instances::is_assembly(m);
+    let others = mechanisms.iter().filter(|(i, m)| i != built && !seen(*i, m));
+    (Some(m), others.map(|(_, m)| *m).collect())
 }
 
 /// Most findings that are told one by one.
@@ -211,7 +239,7 @@ fn tidy(diagnostics: &mut Vec<Diagnostic>) {
 
 impl eval::Evaluator<'_> {
     /// Reports `--set` of names that nothing looked for.
-    fn unused_settings(&mut self) {
+    pub(super) fn unused_settings(&mut self) {
         for (i, s) in self.settings.0.iter().enumerate() {
             // A second entry of the same name has been reported as such.
             let again = self.settings.0.iter().take(i).any(|earlier| earlier.path == s.path);

@@ -114,7 +114,7 @@ impl<'a> Evaluator<'a> {
         }
         self.fields.insert(slot, State::Busy);
         self.busy.push((key, shown, asked_at));
-        let result = self.field_value(item.0, record, name, value);
+        let result = self.unscaled(|s| s.field_value(item.0, record, name, value));
         self.busy.pop();
         let state = result.as_ref().map_or(State::Failed, |v| State::Done(v.clone()));
         self.fields.insert(slot, state);

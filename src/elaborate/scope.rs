@@ -3,6 +3,7 @@
 use super::codes;
 use super::eval::{Env, Evaluator, Failed, Outcome};
 use super::load::item_kind;
+use super::scaling::is_limit;
 use super::value::Value;
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::syntax::ast::{Expr, Ident};
@@ -142,7 +143,9 @@ impl<'a> Evaluator<'a> {
         let (name, kind) = (entry.name.clone(), entry.kind.clone());
         self.set_state(scope, local, State::Busy);
         self.busy.push((Key::Local(scope, local), name, asked_at));
+        let around = std::mem::replace(&mut self.as_is, is_limit(&kind));
         let value = self.declared(&kind);
+        self.as_is = around;
         self.busy.pop();
         let state = value.as_ref().map_or(State::Failed, |v| State::Done(v.clone()));
         self.set_state(scope, local, state);

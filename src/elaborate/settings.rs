@@ -50,6 +50,15 @@ impl Settings {
         Self(all)
     }
 
+    /// The settings of a placed mechanism: `finger.leaf` is its `leaf`.
+    pub fn below(&self, mechanism: &str) -> Self {
+        let inside = |s: &Setting| {
+            let path = s.path.strip_prefix(mechanism)?.strip_prefix('.')?.to_string();
+            Some(Setting { path, value: s.value.clone(), at: s.at })
+        };
+        Self(self.0.iter().filter_map(inside).collect())
+    }
+
     /// The setting of `path`: its index and value (none: it was not understood).
     pub fn find(&self, path: &str) -> Option<(usize, Option<&Expr>)> {
         let i = self.0.iter().position(|s| s.path == path)?;

@@ -63,6 +63,8 @@ pub struct Sheet<'a> {
     pub minimize: Option<(&'a [ast::Term], Origin)>,
     pub requires: Vec<RequireText<'a>>,
     pub exports: Vec<&'a Expr>,
+    pub places: Vec<(&'a ast::Place, Origin)>,
+    pub mirrors: Vec<(&'a ast::Mirror, Origin)>,
     /// Something could not be understood: what seems missing may be there.
     pub broken: bool,
     /// Something is not available yet: it may be what seems missing.
@@ -200,6 +202,16 @@ impl<'a> Evaluator<'a> {
                 sheet.requires.push(RequireText { left, op: op.node, right, at });
             }
             StatementKind::Export(list) => sheet.exports.extend(list),
+            StatementKind::Place(place) => {
+                if self.name_thing(scope, &place.name, "instance") {
+                    sheet.places.push((place, at));
+                }
+            }
+            StatementKind::Mirror(mirror) => {
+                if self.name_thing(scope, &mirror.name, "instance") {
+                    sheet.mirrors.push((mirror, at));
+                }
+            }
             StatementKind::Rod(_) | StatementKind::OwnBody { .. } => self.out.push(
                 Diagnostic::error(codes::MISPLACED, "this stands in a `flexure`, not in a mechanism", at)
                     .help("declare `flexure NAME replaces hinge { … }` and use it with `as NAME`"),

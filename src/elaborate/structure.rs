@@ -314,7 +314,7 @@ impl<'a> Evaluator<'a> {
         self.direction(scope, e)
     }
 
-    fn direction(&mut self, scope: usize, e: &'a Expr) -> Outcome<[f64; 3]> {
+    pub(super) fn direction(&mut self, scope: usize, e: &'a Expr) -> Outcome<[f64; 3]> {
         self.unit_direction(scope, e, "an axis", "write `axis z` or `axis (0, 1, 0.25)`")
     }
 
@@ -371,7 +371,7 @@ impl<'a> Evaluator<'a> {
                     .help("leave out `pin`, or `as …`"),
             );
         }
-        let d = self.eval_fixed(scope, e, Dimension::LENGTH, "the pin's diameter")?;
+        let d = self.unscaled(|s| s.eval_fixed(scope, e, Dimension::LENGTH, "the pin's diameter"))?;
         if d <= 0.0 {
             return self.fail(Diagnostic::error(codes::SIZE, "the pin's diameter must be positive", e.at));
         }

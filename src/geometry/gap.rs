@@ -109,7 +109,7 @@ pub fn fusions(
 }
 
 /// Least gap below a bound, and its place; `None` if all stay farther apart.
-fn worst(a: &[Slot], b: &[Slot], bound_mm: f64) -> Option<(f64, Vector3<f64>)> {
+pub(super) fn worst(a: &[Slot], b: &[Slot], bound_mm: f64) -> Option<(f64, Vector3<f64>)> {
     // Rounding of two faces that are exactly the clearance apart is no finding.
     let mut best = (bound_mm * (1.0 - 1e-6) - 1e-6, None);
     for p in a {

@@ -13,6 +13,7 @@
 //! | `tidy` | removal of tiny edges before rounding to `f32` |
 //! | `union` | the boolean kernel's only client |
 //! | `mesh`, `check`, `ray` | triangle meshes, their facts, measurements on them |
+//! | `joined` | parts of several instances |
 //! | `distance`, `gap`, `cycle` | least distances, overlaps in the rest pose, gaps over a cycle |
 
 pub mod anchor;
@@ -25,6 +26,7 @@ mod field;
 pub mod gap;
 mod guide;
 pub mod input;
+pub mod joined;
 mod layers;
 pub mod link;
 pub mod mesh;

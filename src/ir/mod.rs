@@ -2,6 +2,7 @@
 //! [`Solution`] all that they hand back. Plain data; units are mm, N, MPa, rad, s throughout.
 
 mod aim;
+pub mod assembly;
 mod drive;
 pub mod expr;
 mod load;
@@ -10,6 +11,7 @@ mod solution;
 
 pub use crate::diagnostic::Origin;
 pub use aim::{Aims, BodyAngle, Direction, Target, TargetOf, TargetPath};
+pub use assembly::{Assembly, Instance, Placement};
 pub use drive::{Cable, Drive, DriveOn, DriveUnit, Profile};
 use expr::{ExprGraph, ExprId};
 pub use load::{Load, LoadKind};

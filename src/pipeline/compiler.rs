@@ -2,6 +2,7 @@
 //! optimisation and geometry.
 
 use super::aims::AimSeries;
+use super::joined::{self, Solid};
 use super::progress::Iteration;
 use super::report::Artefact;
 use super::solids;
@@ -12,7 +13,8 @@ use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
 use crate::emit::stl::stl_bytes;
 use crate::equilibrium::{Cycle, Equilibrium, Layout, Model, ModelError, SweepError, sweep};
-use crate::ir::{Design, DriveOn, ObjectiveKind, Solution};
+use crate::geometry::parts_input;
+use crate::ir::{Assembly, Design, DriveOn, ObjectiveKind, Solution};
 use crate::kinematics::{Constraint, Motion, solve_motion};
 use crate::math::{Pose, log_so3};
 use crate::optimize::{self, Ending, Method, Problem};
@@ -51,7 +53,7 @@ impl Stages for Compiler {
     ) -> Checked {
         let options = Options { set: overrides.to_vec(), steps };
         let out = elaborate(source, files, &options);
-        Checked { sources: out.sources, design: out.design, diagnostics: out.diagnostics }
+        Checked { sources: out.sources, assembly: out.assembly, diagnostics: out.diagnostics }
     }
 
     fn rigid(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
@@ -183,21 +185,34 @@ impl Stages for Compiler {
         })
     }
 
-    fn mesh(&self, design: &Design, values: &[f64]) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
-        solids::available(design)?;
-        let (layout, _) = layout(design, values)?;
-        let model = Model::new(design, &layout, values, MESH_EDGES, false).map_err(|e| no_rod(design, &e))?;
-        // What flexures sweep over the cycle is taken out of their own links.
-        let solved = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
-        let cycle = sweep(&solved).map_err(|e| lost(design, &e))?;
-        let states = solids::states(design, &layout, &solved, &cycle);
-        let (parts, found) = solids::build(design, &layout, &model, &states)?;
+    fn parts(
+        &self,
+        assembly: &Assembly,
+        values: &[Vec<f64>],
+    ) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
+        let mut found = Vec::new();
+        let mut built = Vec::new();
+        for (design, values) in assembly.designs.iter().zip(values) {
+            solids::available(design)?;
+            let (layout, _) = layout(design, values)?;
+            let model =
+                Model::new(design, &layout, values, MESH_EDGES, false).map_err(|e| no_rod(design, &e))?;
+            // What flexures sweep over the cycle is taken out of their own links.
+            let solved = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
+            let cycle = sweep(&solved).map_err(|e| lost(design, &e))?;
+            let states = solids::states(design, &layout, &solved, &cycle);
+            let (parts, findings) = solids::build(design, &layout, &model, &states)?;
+            found.extend(findings);
+            built.push(Solid { input: parts_input(design, &layout, &model), parts });
+        }
+        let (parts, findings) = joined::parts(assembly, &built)?;
+        found.extend(findings);
         let mut artefacts = Vec::new();
-        for part in &parts.parts {
+        for part in &parts {
             let bytes = stl_bytes(&part.mesh).map_err(|e| {
-                vec![Diagnostic::error("E0631", format!("no STL can be written: {e}"), design.origin)]
+                vec![Diagnostic::error("E0631", format!("no STL can be written: {e}"), assembly.origin)]
             })?;
-            artefacts.push(Artefact { name: format!("{}_{}.stl", design.name, part.name), bytes });
+            artefacts.push(Artefact { name: format!("{}.stl", part.name), bytes });
         }
         Ok((artefacts, found))
     }

@@ -59,7 +59,7 @@ pub fn check_requirements(
     design.requirements.iter().map(|r| check_requirement(r, is_closed(design), simulation, found)).collect()
 }
 
-fn check_requirement(
+pub(super) fn check_requirement(
     requirement: &Requirement,
     closed: bool,
     simulation: &Simulation,

@@ -2,7 +2,9 @@
 //! files come in through [`Files`], artefacts go out as names and bytes, time and threads come from outside.
 
 mod aims;
+mod assembly;
 mod compiler;
+mod joined;
 mod measure;
 mod progress;
 mod report;
@@ -25,7 +27,7 @@ use crate::diagnostic::{Diagnostic, Severity};
 pub use crate::elaborate::{FileError, Files};
 use crate::emit::arduino::Sketch;
 use crate::emit::lock::{Lock, LockState};
-use crate::ir::{Design, ExportKind, Solution};
+use crate::ir::{Assembly, Design, ExportKind, Solution};
 use std::sync::atomic::AtomicBool;
 
 /// What is to be built.
@@ -80,39 +82,44 @@ fn run_build(
 ) -> Option<()> {
     // Text to design, and the conventional mechanism as a check of it.
     let clock = Clock::start(progress, Stage::Check);
-    let design = front_end(request, stages, files, out);
+    let assembly = front_end(request, stages, files, out);
     clock.stop(&mut out.seconds.check);
-    let design = design?;
+    let assembly = assembly?;
 
-    // Design to values.
+    // Designs to values.
     let clock = Clock::start(progress, Stage::Solve);
-    let solution = solve(request, &design, stages, progress, cancel, out);
+    let solutions = solve_all(request, &assembly, stages, progress, cancel, out);
     clock.stop(&mut out.seconds.solve);
-    let solution = solution?;
-    let values = values_of(&design, &solution);
+    let solutions = solutions?;
+    let pairs = || assembly.designs.iter().zip(&solutions);
+    let values: Vec<Vec<f64>> = pairs().map(|(design, solution)| values_of(design, solution)).collect();
 
     // Values to numbers: before, after, and what was required.
     let clock = Clock::start(progress, Stage::Simulate);
-    let starts: Vec<f64> = design.free.iter().map(|v| v.start).collect();
-    out.before = stages.simulate(&design, &starts).ok().map(|s| measure(&design, &s));
-    let simulation = keep(stages.simulate(&design, &values), &mut out.diagnostics);
+    let start = |d: &Design| stages.simulate(d, &starts(d));
+    let before: Option<Vec<Simulation>> = assembly.designs.iter().map(|d| start(d).ok()).collect();
+    out.before = before.map(|b| assembly::measure_all(&assembly, &assembly::place(&assembly, &b)));
+    let after = assembly.designs.iter().zip(&values);
+    let after = after.map(|(d, v)| stages.simulate(d, v)).collect::<Result<Vec<Simulation>, Failed>>();
+    let simulations = keep(after, &mut out.diagnostics);
     clock.stop(&mut out.seconds.solve);
-    let simulation = simulation?;
-    out.diagnostics.extend(simulation.diagnostics.iter().cloned());
-    out.after = Some(measure(&design, &simulation));
-    out.requirements = check_requirements(&design, &simulation, &mut out.diagnostics);
+    let simulations = simulations?;
+    tell_once(simulations.iter().flat_map(|s| s.diagnostics.iter().cloned()), out);
+    let placed = assembly::place(&assembly, &simulations);
+    out.after = Some(assembly::measure_all(&assembly, &placed));
+    out.requirements = assembly::check_all(&assembly, &simulations, &placed, &mut out.diagnostics);
 
     // Values to files.
     let clock = Clock::start(progress, Stage::Mesh);
-    if design.exports.iter().any(|e| e.kind == ExportKind::Stl)
-        && let Some((parts, found)) = keep(stages.mesh(&design, &values), &mut out.diagnostics)
+    if assembly.exports.iter().any(|e| e.export.kind == ExportKind::Stl)
+        && let Some((parts, found)) = keep(stages.parts(&assembly, &values), &mut out.diagnostics)
     {
         out.artefacts.extend(parts);
-        out.diagnostics.extend(found);
+        tell_once(found, out);
     }
     clock.stop(&mut out.seconds.mesh);
     let clock = Clock::start(progress, Stage::Emit);
-    emit_sketches(&design, &values, out);
+    emit_sketches(&assembly, &values, out);
     clock.stop(&mut out.seconds.emit);
     Some(())
 }
@@ -132,29 +139,37 @@ pub fn simulate(
     files: &dyn Files,
 ) -> (BuildOutcome, Option<Simulation>) {
     let mut out = BuildOutcome::default();
-    let simulation = front_end(request, stages, files, &mut out).and_then(|design| {
-        let start = Solution { values: start_of(&design), ..Solution::default() };
+    let simulation = front_end(request, stages, files, &mut out).and_then(|assembly| {
         // Where nothing of the geometry is free, the conventional motion needs no lock.
-        let result = if show.rigid && design.geometry_variables().is_empty() {
-            stages.rigid(&design, &values_of(&design, &start))
+        let drawn = assembly.designs.iter().all(|d| d.geometry_variables().is_empty());
+        let simulations = if show.rigid && drawn {
+            let rigid = assembly.designs.iter().map(|d| stages.rigid(d, &starts(d)));
+            keep(rigid.collect::<Result<Vec<_>, Failed>>(), &mut out.diagnostics)?
         } else {
-            let solution = match read_lock(request, &design, &mut out) {
-                Ok(Some((lock, LockState::Current))) => lock.solution,
-                Ok(_) if request.frozen => {
-                    out.diagnostics.push(frozen(&design, request));
-                    return None;
-                }
-                Ok(_) => start,
-                Err(()) => return None,
-            };
-            let values = values_of(&design, &solution);
-            if show.rigid { stages.rigid(&design, &values) } else { stages.simulate(&design, &values) }
-        };
-        let mut simulation = keep(result, &mut out.diagnostics)?;
-        if !show.rigid {
+            let mut found = Vec::new();
+            for (design, lock) in assembly.designs.iter().zip(read_locks(request, &assembly, &mut out).ok()?)
+            {
+                let solution = match lock {
+                    Some((lock, LockState::Current)) => lock.solution,
+                    _ if request.frozen => {
+                        out.diagnostics.push(frozen(design, request));
+                        return None;
+                    }
+                    _ => Solution { values: start_of(design), ..Solution::default() },
+                };
+                let values = values_of(design, &solution);
+                let shown =
+                    if show.rigid { stages.rigid(design, &values) } else { stages.simulate(design, &values) };
+                found.push(keep(shown, &mut out.diagnostics)?);
+            }
             // The conventional motion's findings have been told by the check.
-            out.diagnostics.append(&mut simulation.diagnostics);
-        }
+            if !show.rigid {
+                tell_once(found.iter().flat_map(|s| s.diagnostics.iter().cloned()), &mut out);
+            }
+            found
+        };
+        let placed = assembly::place(&assembly, &simulations);
+        let mut simulation = assembly::combine(&assembly, placed);
         if !show.poses {
             simulation.motion.bodies.clear();
         }
@@ -168,32 +183,75 @@ fn front_end(
     stages: &dyn Stages,
     files: &dyn Files,
     out: &mut BuildOutcome,
-) -> Option<Design> {
+) -> Option<Assembly> {
     let checked = stages.check(&request.source, &request.overrides, request.steps, files);
     out.sources = checked.sources;
     out.diagnostics.extend(checked.diagnostics);
     if out.diagnostics.iter().any(Diagnostic::is_error) {
         return None;
     }
-    let design = checked.design?;
-    let starts: Vec<f64> = design.free.iter().map(|v| v.start).collect();
+    let assembly = checked.assembly?;
     // That it can be assembled all the way is part of being right.
-    let rigid = keep(stages.rigid(&design, &starts), &mut out.diagnostics)?;
-    out.diagnostics.extend(rigid.diagnostics);
-    out.design = Some(design.clone());
-    Some(design)
+    for design in &assembly.designs {
+        let rigid = keep(stages.rigid(design, &starts(design)), &mut out.diagnostics)?;
+        tell_once(rigid.diagnostics, out);
+    }
+    out.design = assembly.single().cloned();
+    out.assembly = Some(assembly.clone());
+    Some(assembly)
+}
+
+/// Findings that another design of the same mechanism has not given yet.
+fn tell_once(found: impl IntoIterator<Item = Diagnostic>, out: &mut BuildOutcome) {
+    for d in found {
+        if !out.diagnostics.contains(&d) {
+            out.diagnostics.push(d);
+        }
+    }
+}
+
+/// Solves every design that the lock does not know; writes the lock anew if there was one.
+fn solve_all(
+    request: &Request,
+    assembly: &Assembly,
+    stages: &dyn Stages,
+    progress: &dyn Progress,
+    cancel: &AtomicBool,
+    out: &mut BuildOutcome,
+) -> Option<Vec<Solution>> {
+    let locks = read_locks(request, assembly, out).ok()?;
+    let mut origins = Vec::new();
+    let mut solved: Vec<(String, Lock)> = Vec::new();
+    for (design, lock) in assembly.designs.iter().zip(locks) {
+        if assembly.designs.len() > 1 {
+            progress.design(&design.name);
+        }
+        let solution = solve(request, design, lock, stages, progress, cancel, out)?;
+        origins.push(out.solved_from);
+        solved.push((design.name.clone(), Lock::new(design, solution)));
+    }
+    let solutions = solved.iter().map(|(_, l)| l.solution.clone()).collect();
+    let lock = match (assembly.designs.as_slice(), solved.as_slice()) {
+        ([_], [(_, only)]) => only.clone(),
+        _ => Lock::join(solved),
+    };
+    out.solution = Some(lock.solution.clone());
+    let new = origins.iter().find(|o| **o != Origin::Lock);
+    out.solved_from = new.copied().unwrap_or(out.solved_from);
+    out.lock = new.map(|_| lock.write());
+    Some(solutions)
 }
 
 /// The lock's values if it is current, else the optimiser's.
 fn solve(
     request: &Request,
     design: &Design,
+    lock: Option<(Lock, LockState)>,
     stages: &dyn Stages,
     progress: &dyn Progress,
     cancel: &AtomicBool,
     out: &mut BuildOutcome,
 ) -> Option<Solution> {
-    let lock = read_lock(request, design, out).ok()?;
     let start = match lock {
         Some((lock, LockState::Current)) => {
             if !lock.solution.converged {
@@ -203,7 +261,6 @@ fn solve(
                 );
             }
             out.solved_from = Origin::Lock;
-            out.solution = Some(lock.solution.clone());
             return Some(lock.solution);
         }
         _ if request.frozen => {
@@ -240,25 +297,25 @@ fn solve(
                 .help("the best point found is kept in the lock; `--fresh` solves the design again"),
         );
     }
-    out.lock = Some(Lock::new(design, solved.solution.clone()).write());
-    out.solution = Some(solved.solution.clone());
     Some(solved.solution)
 }
 
-/// The lock and what it is worth; `Err` if it cannot be understood.
-fn read_lock(
+/// The lock and what it is worth for each design; `Err` if it cannot be understood.
+fn read_locks(
     request: &Request,
-    design: &Design,
+    assembly: &Assembly,
     out: &mut BuildOutcome,
-) -> Result<Option<(Lock, LockState)>, ()> {
+) -> Result<Vec<Option<(Lock, LockState)>>, ()> {
+    let several = assembly.designs.len() > 1;
     let Some((name, text)) = request.lock.as_ref().filter(|_| !request.fresh) else {
-        return Ok(None);
+        return Ok(vec![None; assembly.designs.len()]);
     };
     let file = out.sources.add(name, text);
     match Lock::parse(text, file) {
         Ok(lock) => {
-            let state = lock.state(design);
-            Ok(Some((lock, state)))
+            let own = |d: &Design| if several { lock.part(&d.name) } else { lock.clone() };
+            let judged = |d: &Design| Some((own(d), own(d).state(d)));
+            Ok(assembly.designs.iter().map(judged).collect())
         }
         Err(found) => {
             out.diagnostics.extend(found);
@@ -275,10 +332,15 @@ fn frozen(design: &Design, request: &Request) -> Diagnostic {
     Diagnostic::error("E0710", message, design.origin).help("build without `--frozen` and keep the new lock")
 }
 
-fn emit_sketches(design: &Design, values: &[f64], out: &mut BuildOutcome) {
-    for export in &design.exports {
+fn emit_sketches(assembly: &Assembly, values: &[Vec<f64>], out: &mut BuildOutcome) {
+    for placed in &assembly.exports {
+        let export = &placed.export;
         let ExportKind::Arduino(drive) = export.kind else { continue };
-        match Sketch::of(design, drive, values).and_then(|s| Ok((s.name(), s.render()?))) {
+        let Some((design, drive)) = assembly::driven(assembly, placed, drive) else { continue };
+        let own = placed.instance.and_then(|i| values.get(assembly.instances.get(i)?.design));
+        match Sketch::of(&design, drive, own.map_or(&[], Vec::as_slice))
+            .and_then(|s| Ok((s.name(), s.render()?)))
+        {
             Ok((name, text)) => {
                 out.artefacts.push(Artefact { name: format!("{name}/{name}.ino"), bytes: text.into_bytes() })
             }
@@ -288,6 +350,10 @@ fn emit_sketches(design: &Design, values: &[f64], out: &mut BuildOutcome) {
             }
         }
     }
+}
+
+fn starts(design: &Design) -> Vec<f64> {
+    design.free.iter().map(|v| v.start).collect()
 }
 
 fn start_of(design: &Design) -> std::collections::BTreeMap<String, f64> {

@@ -36,6 +36,8 @@ pub trait Progress {
     fn seconds(&self) -> f64;
     /// A stage begins.
     fn stage(&self, _stage: Stage) {}
+    /// One of several designs is solved next.
+    fn design(&self, _name: &str) {}
     /// The optimiser has done an iteration.
     fn iteration(&self, _iteration: &Iteration) {}
 }

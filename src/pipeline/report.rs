@@ -3,7 +3,7 @@
 use super::aims::{DirectionMeasures, OutputMeasures};
 use super::stability::Stability;
 use crate::diagnostic::{Diagnostic, SourceMap};
-use crate::ir::{Design, Solution};
+use crate::ir::{Assembly, Design, Solution};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -139,7 +139,9 @@ pub struct BuildOutcome {
     pub sources: SourceMap,
     /// Findings of all stages, in their order.
     pub diagnostics: Vec<Diagnostic>,
-    /// The elaborated design.
+    /// What is built.
+    pub assembly: Option<Assembly>,
+    /// Its design, if it is one mechanism that places no others.
     pub design: Option<Design>,
     /// The solved values.
     pub solution: Option<Solution>,

@@ -8,7 +8,7 @@ use super::stability::Stability;
 use crate::diagnostic::{Diagnostic, SourceMap};
 use crate::elaborate::Files;
 use crate::emit::csv::MotionTable;
-use crate::ir::{Design, Solution};
+use crate::ir::{Assembly, Design, Solution};
 use std::sync::atomic::AtomicBool;
 
 /// Findings of a stage that gave nothing.
@@ -19,8 +19,8 @@ pub type Failed = Vec<Diagnostic>;
 pub struct Checked {
     /// The files read.
     pub sources: SourceMap,
-    /// The design, if there were no errors.
-    pub design: Option<Design>,
+    /// What is to be built, if there were no errors.
+    pub assembly: Option<Assembly>,
     /// Findings.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -88,9 +88,22 @@ pub trait Stages {
         cancel: &AtomicBool,
     ) -> Result<Solved, Failed>;
 
-    /// One file a printed part, and findings that do not stop the work.
+    /// One file a printed part of the whole assembly, and findings that do not stop the work. `values` are those of
+    /// each design.
     ///
     /// # Errors
     /// Where no closed solid comes out.
-    fn mesh(&self, design: &Design, values: &[f64]) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed>;
+    fn parts(
+        &self,
+        assembly: &Assembly,
+        values: &[Vec<f64>],
+    ) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed>;
+
+    /// The same of a mechanism by itself.
+    ///
+    /// # Errors
+    /// Where no closed solid comes out.
+    fn mesh(&self, design: &Design, values: &[f64]) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
+        self.parts(&Assembly::of(design.clone()), &[values.to_vec()])
+    }
 }

@@ -104,7 +104,7 @@ impl Stages for Toy {
         }
         let mut sources = SourceMap::default();
         sources.add(source, "text");
-        Checked { sources, design: Some(design), diagnostics: Vec::new() }
+        Checked { sources, assembly: Some(Assembly::of(design)), diagnostics: Vec::new() }
     }
 
     fn rigid(&self, design: &Design, _: &[f64]) -> Result<Simulation, Failed> {
@@ -141,8 +141,8 @@ impl Stages for Toy {
         Ok(Solved { solution, interrupted, diagnostics: Vec::new() })
     }
 
-    fn mesh(&self, _: &Design, values: &[f64]) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
-        let part = Artefact { name: "toy.stl".into(), bytes: values[0].to_le_bytes().to_vec() };
+    fn parts(&self, _: &Assembly, values: &[Vec<f64>]) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
+        let part = Artefact { name: "toy.stl".into(), bytes: values[0][0].to_le_bytes().to_vec() };
         Ok((vec![part], Vec::new()))
     }
 }

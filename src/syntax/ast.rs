@@ -230,6 +230,10 @@ pub enum StatementKind {
     Load(Box<Load>),
     /// `rod NAME { [axis second] from a at … along … to b at … along … section … }` (templates only)
     Rod(Box<Rod>),
+    /// `place NAME = MECHANISM at P [turned A about D] [scale = K] [merging GROUND into BODY]…`
+    Place(Box<Place>),
+    /// `mirror NAME = INSTANCE across yz [sharing BODY, …]`
+    Mirror(Box<Mirror>),
     /// `body NAME`: a body that a template brings along (templates only)
     OwnBody {
         /// Name.
@@ -326,6 +330,36 @@ pub struct TemplateUse {
     pub name: Ident,
     /// Overrides in order.
     pub overrides: Vec<(Ident, Expr)>,
+}
+
+/// A mechanism put somewhere.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Place {
+    /// Name of the instance.
+    pub name: Ident,
+    /// The mechanism.
+    pub mechanism: Ident,
+    /// Where its origin goes.
+    pub point: Expr,
+    /// `turned A about D`.
+    pub turned: Option<(Expr, Expr)>,
+    /// `scale = K`.
+    pub scale: Option<Expr>,
+    /// `merging GROUND into BODY`, each.
+    pub merging: Vec<(Ident, Ident)>,
+}
+
+/// The mirror image of an instance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mirror {
+    /// Name of the new instance.
+    pub name: Ident,
+    /// The instance it is an image of.
+    pub of: Ident,
+    /// `yz`, `zx` or `xy`.
+    pub plane: Ident,
+    /// `sharing BODY, …`: bodies that both have in common.
+    pub sharing: Vec<Ident>,
 }
 
 /// The profile of a drive.

@@ -8,6 +8,7 @@ mod errors;
 mod expression;
 mod found;
 mod grammar;
+mod instances;
 pub mod limits;
 mod lower;
 mod statement;

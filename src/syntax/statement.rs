@@ -74,6 +74,8 @@ impl Lower<'_> {
                 node.all(Kind::Artefact).filter_map(|n| n.parts().next()).map(|n| self.expr(n)).collect(),
             ),
             Kind::Rod => StatementKind::Rod(Box::new(self.rod(node)?)),
+            Kind::Place => StatementKind::Place(Box::new(self.place(node)?)),
+            Kind::Mirror => StatementKind::Mirror(Box::new(self.mirror(node)?)),
             Kind::OwnBody => StatementKind::OwnBody {
                 name: self.ident(node)?,
                 points: node.first(Kind::Points).map(|n| self.idents(n)).unwrap_or_default(),
@@ -85,7 +87,7 @@ impl Lower<'_> {
         })
     }
 
-    fn values(&mut self, node: &Node) -> Vec<Expr> {
+    pub(super) fn values(&mut self, node: &Node) -> Vec<Expr> {
         node.all(Kind::Value).map(|n| self.expr(n)).collect()
     }
 
@@ -130,7 +132,7 @@ impl Lower<'_> {
         Some(joint)
     }
 
-    fn twice(&mut self, clause: &Node, first: Origin) {
+    pub(super) fn twice(&mut self, clause: &Node, first: Origin) {
         let word = clause.first(Kind::Keyword).map_or("", |n| self.text(n));
         let at = self.origin(clause);
         self.report(

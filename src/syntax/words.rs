@@ -102,6 +102,8 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "field" => "NAME = VALUE",
         "require" => "require VALUE <= VALUE",
         "export" => "export NAME, …",
+        "place" => "place NAME = MECHANISM at POINT",
+        "mirror" => "mirror NAME = INSTANCE across yz",
         "body" => "body NAME",
         "rod" => "rod NAME { from a at … along … to b at … along … section … }",
         "string" => "string NAME: BODY at POINT to BODY via POINT",

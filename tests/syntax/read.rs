@@ -183,6 +183,14 @@ fn statements_of_the_whole_language_are_known_by_their_keyword() {
         .iter()
         .map(|s| match s {
             StatementKind::Later { keyword } => keyword.node.clone(),
+            StatementKind::Place(place) => {
+                assert!(place.turned.is_some() && place.scale.is_none() && place.merging.is_empty());
+                format!("place {} {}", place.name.node, place.mechanism.node)
+            }
+            StatementKind::Mirror(mirror) => {
+                let shared: Vec<&str> = mirror.sharing.iter().map(|s| s.node.as_str()).collect();
+                format!("mirror {} {} {} {shared:?}", mirror.name.node, mirror.of.node, mirror.plane.node)
+            }
             StatementKind::Drive {
                 profile: Profile::Keys { smooth: false, keys, .. },
                 motor,
@@ -200,8 +208,8 @@ fn statements_of_the_whole_language_are_known_by_their_keyword() {
     assert_eq!(
         words,
         [
-            "place",
-            "mirror",
+            "place right half",
+            "mirror left right yz [\"a\", \"b\"]",
             "mount",
             "string via 1",
             "variant",

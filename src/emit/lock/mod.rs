@@ -18,6 +18,9 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
+mod several;
+pub use several::Head;
+
 /// Raised whenever the solver would find something else for the same design.
 pub const SOLVER_VERSION: &str = "3";
 const TITLE: &str = "# flexura lock 1";
@@ -38,6 +41,8 @@ pub struct Lock {
     pub units: BTreeMap<String, String>,
     /// Whether the values are the ones that were written (false: edited since).
     pub intact: bool,
+    /// Headings by name where the lock is of several designs.
+    pub named: BTreeMap<String, Head>,
 }
 
 /// What a lock is worth for a design.
@@ -55,7 +60,8 @@ impl Lock {
     /// The lock of a design and its solution.
     pub fn new(design: &Design, solution: Solution) -> Self {
         let units = design.free.iter().map(|v| (v.path.clone(), v.unit.clone())).collect();
-        Self { design: design_digest(design), solver: SOLVER_VERSION.into(), solution, units, intact: true }
+        let (design, solver) = (design_digest(design), SOLVER_VERSION.into());
+        Self { design, solver, solution, units, intact: true, named: BTreeMap::new() }
     }
 
     /// What this lock is worth for a design.
@@ -86,14 +92,18 @@ impl Lock {
     /// The file's text.
     pub fn write(&self) -> String {
         let entries = self.entries();
+        let line =
+            |key: &str, alone: &str, of: fn(&Head) -> String| several::lines(&self.named, key, alone, of);
+        let (iterations, converged) =
+            (self.solution.iterations.to_string(), self.solution.converged.to_string());
         format!(
             "{TITLE}\n# The solved design. Keep it beside its source; `flexura build` reads and writes it.\n\
-             design {}\nsolver {}\nvalues {}\niterations {}\nconverged {}\n\n{entries}",
-            self.design,
+             {}solver {}\nvalues {}\n{}{}\n{entries}",
+            line("design", &self.design, |h| h.design.clone()),
             self.solver,
             digest(entries.as_bytes()),
-            self.solution.iterations,
-            self.solution.converged,
+            line("iterations", &iterations, |h| h.iterations.to_string()),
+            line("converged", &converged, |h| h.converged.to_string()),
         )
     }
 
@@ -242,6 +252,9 @@ impl Parser<'_> {
     fn header(&mut self, line: &str, at: Origin, written_digest: &mut Option<String>) {
         let (key, value) = line.split_once(' ').unwrap_or((line, ""));
         let value = value.trim();
+        if let ("design" | "iterations" | "converged", Some((name, value))) = (key, value.split_once(' ')) {
+            return self.named(key, name, value, at);
+        }
         self.once(key, at);
         match key {
             "design" | "values" if !is_digest(value) => {
@@ -266,6 +279,23 @@ impl Parser<'_> {
         }
     }
 
+    /// A heading of one of several designs.
+    fn named(&mut self, key: &str, name: &str, value: &str, at: Origin) {
+        self.once(&format!("{key} {name}"), at);
+        let head = self.lock.named.entry(name.into()).or_default();
+        let read = match key {
+            "design" => {
+                head.design = value.into();
+                is_digest(value)
+            }
+            "iterations" => value.parse().map(|n| head.iterations = n).is_ok(),
+            _ => value.parse().map(|yes| head.converged = yes).is_ok(),
+        };
+        if !read {
+            self.fail("E0703", format!("`{key} {name}` has a value that cannot be read"), at);
+        }
+    }
+
     fn entry(&mut self, line: &str, at: Origin) {
         let (path, rest) = line.split_once('=').unwrap_or((line, ""));
         let path = path.trim();
@@ -286,7 +316,11 @@ impl Parser<'_> {
     fn complete(&mut self) {
         let end = self.place(self.text.len(), 0);
         for key in ["design", "solver", "values", "iterations", "converged"] {
-            if !self.seen.contains_key(key) {
+            let of_designs = |name: &String| self.seen.contains_key(&format!("{key} {name}"));
+            let named = matches!(key, "design" | "iterations" | "converged") && !self.lock.named.is_empty();
+            let stated =
+                if named { self.lock.named.keys().all(of_designs) } else { self.seen.contains_key(key) };
+            if !stated {
                 self.fail("E0705", format!("the lock has no `{key}` line: it is incomplete"), end);
             }
         }

@@ -16,6 +16,7 @@ fn sample() -> Lock {
         },
         units: units.map(|(p, u)| (p.to_string(), u.to_string())).into(),
         intact: true,
+        named: BTreeMap::new(),
     }
 }
 
@@ -99,4 +100,26 @@ proptest! {
             prop_assert!(same || !lock.intact);
         }
     }
+}
+
+#[test]
+fn several_designs_have_a_part_each() {
+    let finger = sample();
+    let mut thumb = sample();
+    thumb.design = digest(b"thumb");
+    thumb.solution.values.insert("knee.thickness".into(), 0.9);
+    (thumb.solution.iterations, thumb.solution.converged) = (4, false);
+    let joined = Lock::join([("finger".to_string(), finger.clone()), ("thumb".to_string(), thumb.clone())]);
+    assert_eq!((joined.solution.iterations, joined.solution.converged), (27, false));
+    let text = joined.write();
+    let read = Lock::parse(&text, 0).unwrap();
+    assert_eq!(read.part("finger"), finger);
+    assert_eq!(read.part("thumb"), thumb);
+    assert_eq!(read.write(), text);
+    assert_eq!(read.part("palm").solution.values, BTreeMap::new(), "nothing is known of it");
+    assert_eq!(codes(&text.replace("converged thumb false\n", "")), ["E0705"]);
+    assert_eq!(codes(&text.replace("iterations finger 23", "iterations finger many")), ["E0703"]);
+    let edited =
+        Lock::parse(&text.replace("thumb.knee.thickness = 0.9", "thumb.knee.thickness = 0.7"), 0).unwrap();
+    assert!(!edited.part("thumb").intact);
 }

@@ -1,0 +1,251 @@
+//! From the simulated designs to what their instances do in the assembly: places, states, common motors.
+
+use super::aims::AimSeries;
+use super::measure::{check_requirement, check_requirements, is_closed, measure};
+use super::report::{Measures, RequirementResult};
+use super::stages::Simulation;
+use crate::diagnostic::Diagnostic;
+use crate::emit::csv::{MotionState, MotionTable};
+use crate::ir::assembly::AssemblyExport;
+use crate::ir::{Assembly, Design, Instance, Placement};
+use crate::math::exp_so3;
+use nalgebra::Vector3;
+
+/// What every instance does, in the assembly's coordinates and states; `designs` are the simulations of the designs.
+/// A drive's load is that of its motor: the sum over all instances that have it in common.
+pub fn place(assembly: &Assembly, designs: &[Simulation]) -> Vec<Simulation> {
+    if assembly.single().is_some() {
+        return designs.to_vec();
+    }
+    let pairs = assembly.placed().filter_map(|(i, d)| Some((i, d, designs.get(i.design)?)));
+    let mut placed: Vec<Simulation> = pairs.map(|(i, d, s)| placed_simulation(i, d, s)).collect();
+    for motor in 0..assembly.motors.len() {
+        let members: Vec<(usize, usize, f64)> = assembly.members(motor).collect();
+        if members.len() < 2 {
+            continue;
+        }
+        let states = placed.iter().map(|s| s.motion.states.len()).min().unwrap_or(0);
+        for s in 0..states {
+            let load = |i: usize, k: usize| {
+                placed.get(i).and_then(|p| p.motion.states.get(s)?.drive_loads.get(k).copied())
+            };
+            let sum: Option<f64> = members.iter().map(|(i, k, _)| load(*i, *k)).sum();
+            for (i, k, _) in &members {
+                let slot =
+                    placed.get_mut(*i).and_then(|p| p.motion.states.get_mut(s)?.drive_loads.get_mut(*k));
+                if let (Some(slot), Some(sum)) = (slot, sum) {
+                    *slot = sum;
+                }
+            }
+        }
+    }
+    placed
+}
+
+fn placed_simulation(instance: &Instance, design: &Design, simulation: &Simulation) -> Simulation {
+    let table = &simulation.motion;
+    let order = |n: usize| (0..n).map(|s| instance.state(s));
+    let states = order(table.states.len()).filter_map(|s| table.states.get(s));
+    let series = |values: &[f64]| order(values.len()).filter_map(|s| values.get(s).copied()).collect();
+    let aims = placed_aims(instance, &simulation.aims);
+    Simulation {
+        motion: MotionTable {
+            drives: table.drives.iter().map(|(n, unit)| (instance.of(n), *unit)).collect(),
+            traces: table.traces.iter().map(|n| instance.of(n)).collect(),
+            bodies: table.bodies.iter().map(|n| instance.of(n)).collect(),
+            has_forces: table.has_forces,
+            has_loads: table.has_loads,
+            more: aims.columns(design).into_iter().map(|(n, v)| (column(instance, &n), v)).collect(),
+            states: states.map(|s| placed_state(instance, s)).collect(),
+        },
+        errors_mm: simulation.errors_mm.iter().map(|e| series(e)).collect(),
+        gaps_mm: series(&simulation.gaps_mm),
+        aims,
+        // What a motor in common would do released is not known from one half.
+        stability: if instance.name.is_empty() { simulation.stability.clone() } else { Default::default() },
+        diagnostics: Vec::new(),
+    }
+}
+
+/// `output.curl_deg` of `index` is `output.index.curl_deg`.
+fn column(instance: &Instance, name: &str) -> String {
+    match name.split_once('.') {
+        Some((what, name)) => format!("{what}.{}", instance.of(name)),
+        None => instance.of(name),
+    }
+}
+
+/// Directions turn with the instance; angles are about the image of their axis.
+fn placed_aims(instance: &Instance, aims: &AimSeries) -> AimSeries {
+    fn order<T: Clone>(instance: &Instance, values: &[T]) -> Vec<T> {
+        (0..values.len()).filter_map(|s| values.get(instance.state(s)).cloned()).collect()
+    }
+    let all = |lists: &[Vec<f64>]| lists.iter().map(|v| order(instance, v)).collect();
+    let p = &instance.placement;
+    let turned = |d: [f64; 3]| p.direction(&Vector3::from(d)).into();
+    let directions = aims.directions.iter().map(|v| order(instance, v).into_iter().map(turned).collect());
+    let angles = aims.angles_rad.iter();
+    AimSeries {
+        closest_mm: all(&aims.closest_mm),
+        aim_errors_rad: all(&aims.aim_errors_rad),
+        directions: directions.collect(),
+        angles_rad: angles
+            .map(|v| order(instance, v).into_iter().map(|a| a * p.handedness()).collect())
+            .collect(),
+    }
+}
+
+fn placed_state(instance: &Instance, state: &MotionState) -> MotionState {
+    let p = &instance.placement;
+    let signed = |values: &[f64]| {
+        let sign = |k: usize| instance.drives.get(k).map_or(1.0, |d| d.sign);
+        values.iter().enumerate().map(|(k, v)| sign(k) * v).collect()
+    };
+    MotionState {
+        drives: signed(&state.drives),
+        traces_mm: state.traces_mm.iter().map(|t| p.point(&Vector3::from(*t)).into()).collect(),
+        drive_loads: signed(&state.drive_loads),
+        energy_n_mm: state.energy_n_mm,
+        load_potential_n_mm: state.load_potential_n_mm,
+        stress_max_mpa: state.stress_max_mpa,
+        poses: state.poses.iter().map(|pose| placed_pose(p, pose)).collect(),
+    }
+}
+
+/// Translation and rotation vector of x = t + R X in the assembly, from those in the design.
+fn placed_pose(p: &Placement, (t, r): &([f64; 3], [f64; 3])) -> ([f64; 3], [f64; 3]) {
+    if *p == Placement::IDENTITY {
+        return (*t, *r);
+    }
+    let turn = p.turn(&Vector3::from(*r));
+    // The design's origin lies at the placement's translation: it moves to the image of t.
+    let translation = p.point(&Vector3::from(*t)) - exp_so3(&turn) * Vector3::from(p.translation);
+    (translation.into(), turn.into())
+}
+
+/// One table for all instances: their columns side by side, a motor in common once, energies added, the largest
+/// stress and the least gap of all.
+pub fn combine(assembly: &Assembly, placed: Vec<Simulation>) -> Simulation {
+    if assembly.single().is_some() {
+        return placed.into_iter().next().unwrap_or_default();
+    }
+    let first = |i: usize, k: usize| {
+        let motor = assembly.instances.get(i).and_then(|n| assembly.motors.get(n.drives.get(k)?.motor));
+        motor.is_some_and(|m| (m.instance, m.drive) == (i, k))
+    };
+    let once = |i: usize, body: &String| {
+        let index = |b: &crate::ir::Body, n: &Instance| n.of(&b.name) == *body;
+        let (n, d) = (
+            assembly.instances.get(i),
+            assembly.instances.get(i).and_then(|n| assembly.designs.get(n.design)),
+        );
+        let Some(b) = n.zip(d).and_then(|(n, d)| d.bodies.iter().position(|b| index(b, n))) else {
+            return true;
+        };
+        let group = assembly.joined.iter().find(|j| j.members.contains(&(i, b)));
+        group.is_none_or(|j| j.members.first() == Some(&(i, b)))
+    };
+    let mut out = Simulation::default();
+    let states = placed.iter().map(|p| p.motion.states.len()).min().unwrap_or(0);
+    out.motion.has_forces = placed.iter().any(|p| p.motion.has_forces);
+    out.motion.states = vec![MotionState::default(); states];
+    for (i, p) in placed.iter().enumerate() {
+        let table = &p.motion;
+        let drives: Vec<bool> = (0..table.drives.len()).map(|k| first(i, k)).collect();
+        let bodies: Vec<bool> = table.bodies.iter().map(|b| once(i, b)).collect();
+        out.motion.drives.extend(kept(&table.drives, &drives));
+        out.motion.traces.extend(table.traces.iter().cloned());
+        out.motion.bodies.extend(kept(&table.bodies, &bodies));
+        out.motion.more.extend(table.more.iter().cloned());
+        out.motion.has_loads |= table.has_loads;
+        out.errors_mm.extend(p.errors_mm.iter().cloned());
+        for (sum, s) in out.motion.states.iter_mut().zip(&table.states) {
+            sum.drives.extend(kept(&s.drives, &drives));
+            sum.drive_loads.extend(kept(&s.drive_loads, &drives));
+            sum.traces_mm.extend(s.traces_mm.iter().copied());
+            sum.poses.extend(kept(&s.poses, &bodies));
+            sum.energy_n_mm += s.energy_n_mm;
+            sum.load_potential_n_mm += s.load_potential_n_mm;
+            sum.stress_max_mpa = sum.stress_max_mpa.max(s.stress_max_mpa);
+        }
+        match out.gaps_mm.is_empty() {
+            true => out.gaps_mm.clone_from(&p.gaps_mm),
+            false => out.gaps_mm.iter_mut().zip(&p.gaps_mm).for_each(|(a, b)| *a = a.min(*b)),
+        }
+    }
+    out
+}
+
+fn kept<T: Clone>(values: &[T], which: &[bool]) -> Vec<T> {
+    values.iter().zip(which).filter(|(_, keep)| **keep).map(|(v, _)| v.clone()).collect()
+}
+
+/// Measures by instance (`right.wheel`), a motor in common once, stress and gap of all.
+pub fn measure_all(assembly: &Assembly, placed: &[Simulation]) -> Measures {
+    let mut all = Measures::default();
+    for (i, ((instance, design), simulation)) in assembly.placed().zip(placed).enumerate() {
+        let own = measure(design, simulation);
+        all.directions.extend(own.directions.into_iter().map(|(n, d)| (instance.of(&n), d)));
+        all.outputs.extend(own.outputs.into_iter().map(|(n, o)| (instance.of(&n), o)));
+        all.traces.extend(own.traces.into_iter().map(|(n, t)| (instance.of(&n), t)));
+        for (k, drive) in design.drives.iter().enumerate() {
+            let motor = instance.drives.get(k).and_then(|d| assembly.motors.get(d.motor));
+            let loads = own
+                .drives
+                .get(&drive.name)
+                .filter(|_| motor.is_some_and(|m| (m.instance, m.drive) == (i, k)));
+            all.drives.extend(loads.map(|l| (instance.of(&drive.name), *l)));
+        }
+        all.stress.max_mpa = more(all.stress.max_mpa, own.stress.max_mpa, f64::max);
+        all.gap.least_mm = more(all.gap.least_mm, own.gap.least_mm, f64::min);
+    }
+    all
+}
+
+fn more(a: Option<f64>, b: Option<f64>, how: fn(f64, f64) -> f64) -> Option<f64> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(how(a, b)),
+        (a, b) => a.or(b),
+    }
+}
+
+/// Checks the requirements of every design once, and those of the assembly.
+pub fn check_all(
+    assembly: &Assembly,
+    designs: &[Simulation],
+    placed: &[Simulation],
+    found: &mut Vec<Diagnostic>,
+) -> Vec<RequirementResult> {
+    let mut out = Vec::new();
+    for (design, simulation) in assembly.designs.iter().zip(designs) {
+        let results = check_requirements(design, simulation, found);
+        out.extend(results.into_iter().map(|r| match assembly.single() {
+            Some(_) => r,
+            None => RequirementResult { text: format!("{}: {}", design.name, r.text), ..r },
+        }));
+    }
+    if assembly.requirements.is_empty() {
+        return out;
+    }
+    let closed = assembly.designs.iter().all(is_closed);
+    let whole = combine(assembly, placed.to_vec());
+    for r in &assembly.requirements {
+        let of = r.instance.and_then(|i| placed.get(i)).unwrap_or(&whole);
+        out.push(check_requirement(&r.requirement, closed, of, found));
+    }
+    out
+}
+
+/// The design whose drive an export is for, named after assembly and instance, in the motor's own sense.
+pub fn driven(assembly: &Assembly, export: &AssemblyExport, drive: usize) -> Option<(Design, usize)> {
+    let instance = assembly.instances.get(export.instance?)?;
+    let mut design = assembly.designs.get(instance.design)?.clone();
+    if assembly.single().is_none() {
+        design.name = format!("{}_{}", assembly.name, instance.name);
+        if instance.drives.get(drive)?.sign < 0.0 {
+            let turned = design.drives.get_mut(drive)?;
+            turned.reverse(&mut design.exprs);
+        }
+    }
+    Some((design, drive))
+}
