@@ -121,6 +121,8 @@ fn measures(text: &mut String, out: &BuildOutcome, style: Style) {
     if gap(before).or(gap(after)).is_some() {
         rows.push(("least gap".into(), gap(before), gap(after), "mm"));
     }
+    // What cannot be compared, as the error of a trace without a target, is left out.
+    rows.retain(|(_, b, a, _)| [b, a].iter().any(|v| v.is_some_and(f64::is_finite)));
     let width = rows.iter().map(|r| r.0.chars().count()).max().unwrap_or(0).max(16);
     let heading = format!("{:width$}  {:>10}  {:>10}", "", "before", "after");
     let _ = writeln!(text, "\n{}", style.dim(&heading));
