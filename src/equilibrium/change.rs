@@ -3,8 +3,8 @@
 
 use super::frames::{Aim, Framed, Seen, axes, axis_carrier};
 use super::layout::Layout;
-use crate::ir::expr::Evaluated;
 use super::target::as_curve;
+use crate::ir::expr::Evaluated;
 use crate::ir::{BodyId, Design, ExprPoint, JointId, TargetOf};
 use crate::kinematics::{Constraint, Motion, MotionChange, ReferenceChange, Twist, motion_changes};
 use crate::math::dual::Dual;

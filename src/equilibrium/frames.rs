@@ -70,14 +70,11 @@ impl Framed {
         let first = joint.bodies.first().copied().unwrap_or(0);
         let body = match joint.kind {
             JointKind::Slider => first,
-            _ => {
-                [ends[end], ends[1 - end]].into_iter().find(|b| joint.bodies.contains(b)).unwrap_or(first)
-            }
+            _ => [ends[end], ends[1 - end]].into_iter().find(|b| joint.bodies.contains(b)).unwrap_or(first),
         };
         let across = ends.into_iter().find(|b| *b != body && joint.bodies.contains(b));
-        let only = (joint.bodies.len() == 2)
-            .then(|| joint.bodies.iter().copied().find(|b| *b != body))
-            .flatten();
+        let only =
+            (joint.bodies.len() == 2).then(|| joint.bodies.iter().copied().find(|b| *b != body)).flatten();
         let aimed = |b: BodyId| joint.toward.iter().any(|(t, _)| *t == b);
         let other = across.or(only).filter(|b| !aimed(*b) && !aimed(body));
         Self { body, other }
@@ -105,8 +102,7 @@ pub(super) fn end_frames(design: &Design, motion: &Motion, values: &Evaluated) -
             let aim = Aim::of(design, rod.joint, body).drawn(values, &motion.joint_points);
             (motion.rest_point(body, &aim) - motion.rest_point(body, drawn)).into()
         };
-        let carried =
-            |body: BodyId, axis: [f64; 3]| motion.rest_direction(body, &Vector3::from(axis)).into();
+        let carried = |body: BodyId, axis: [f64; 3]| motion.rest_direction(body, &Vector3::from(axis)).into();
         let second = joint.bodies.get(1).copied().unwrap_or(framed.body);
         let seen = Seen {
             axis: carried(axis_carrier(joint, framed.body), joint.axis),
