@@ -251,7 +251,8 @@ fn angles_are_unwrapped_and_measured() {
         let design = files.design(steps);
         let compiler = Compiler::default();
         let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
-        let rigid = compiler.rigid(&design, &design.free.iter().map(|f| f.start).collect::<Vec<_>>()).unwrap();
+        let rigid =
+            compiler.rigid(&design, &design.free.iter().map(|f| f.start).collect::<Vec<_>>()).unwrap();
         let bent = compiler.simulate(&design, &start).unwrap();
         assert_eq!(rigid.motion.more[0].0, "output.crank_turn_deg");
         for (s, state) in rigid.motion.states.iter().enumerate() {
@@ -284,7 +285,8 @@ fn the_eyes_gaze_is_that_of_the_reference() {
     let files: BTreeMap<String, String> = [("eye.mech".to_string(), text)].into();
     let out = elaborate("eye.mech", &files, &Options::default());
     let design = out.design.unwrap_or_else(|| panic!("{:?}", out.diagnostics));
-    let rigid = Compiler::default().rigid(&design, &design.free.iter().map(|f| f.start).collect::<Vec<_>>()).unwrap();
+    let rigid =
+        Compiler::default().rigid(&design, &design.free.iter().map(|f| f.start).collect::<Vec<_>>()).unwrap();
     let (_, reference) = common::table(include_str!("reference/motion/eye.csv"));
     assert_eq!(reference.len(), rigid.motion.states.len());
     let mut largest: f64 = 0.0;
@@ -408,7 +410,8 @@ fn nothing_is_asked_of_an_idle_turn() {
         let files: BTreeMap<String, String> = [("car.mech".to_string(), text)].into();
         let out = elaborate("car.mech", &files, &Options { steps: Some(4), ..Options::default() });
         let design = out.design.unwrap_or_else(|| panic!("{:?}", out.diagnostics));
-        let rigid = Compiler::default().rigid(&design, &design.free.iter().map(|f| f.start).collect::<Vec<_>>());
+        let rigid =
+            Compiler::default().rigid(&design, &design.free.iter().map(|f| f.start).collect::<Vec<_>>());
         rigid.err().map_or(Vec::new(), |e| e.into_iter().map(|d| d.code.to_string()).collect())
     };
     assert_eq!(found("trace held = (0 mm, 5 mm, 12 mm) on drag_link"), ["E0502"]);

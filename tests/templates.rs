@@ -82,7 +82,8 @@ fn ellipse_inertia(thick: f64, wide: f64) -> f64 {
 }
 
 const HEAD: &str = "use std.materials.rigur\nuse std.processes.polyjet\n";
-const TAIL: &str = "    material rigur\n    print on polyjet\n";
+/// Closed forms are those of slender rods; what the corrected model adds is held against finite elements in `fea.rs`.
+const TAIL: &str = "    material rigur\n    print on polyjet\n    model plain\n";
 
 /// A four-bar in space whose coupler hangs in two wires: base hinge O, crank tip A, rocker tip B, rocker hinge D.
 fn wire_four_bar(length: f64, diameter: f64) -> String {

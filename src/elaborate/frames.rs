@@ -85,7 +85,7 @@ impl<'a> Evaluator<'a> {
                 let candidate = body
                     .skeleton
                     .iter()
-                    .find(|p| norm(minus(self.start_point(p.position), here)) > LEAST_E1_MM)
+                    .find(|p| telling_part(joint, minus(self.start_point(p.position), here)) > LEAST_E1_MM)
                     .map_or("Q", |p| p.name.as_str());
                 let d = Diagnostic::error(
                     codes::END_FRAME,

@@ -1,8 +1,8 @@
 //! `target TRACE = …`: a file, points, or an expression of t in place of the conventional mechanism's own path.
 
-use super::dimension::Dimension;
 use super::aims::AimNames;
 use super::codes;
+use super::dimension::Dimension;
 use super::eval::{Env, Evaluator, Failed, Outcome};
 use super::mechanism::Outside;
 use super::sheet::Sheet;

@@ -3,8 +3,8 @@
 
 use super::frames::{Aim, Framed, Seen, axes, axis_carrier};
 use super::layout::Layout;
-use crate::ir::expr::Evaluated;
 use super::target::as_curve;
+use crate::ir::expr::Evaluated;
 use crate::ir::{BodyId, Design, ExprPoint, JointId, TargetOf};
 use crate::kinematics::{Constraint, Motion, MotionChange, ReferenceChange, Twist, motion_changes};
 use crate::math::dual::Dual;
@@ -175,8 +175,9 @@ impl Making<'_> {
             second: carried(second, joint.second_axis.unwrap_or(joint.axis)),
             way: self.way(text.joint, framed.body),
             other: framed.other.map(|b| self.way(text.joint, b)),
+            leads: framed.leads,
         };
-        let columns = axes(joint, text, end, &seen).map(|e| Vector3::from(e.map(|x| x.eps[0])));
+        let columns = axes(joint, text, &seen).map(|e| Vector3::from(e.map(|x| x.eps[0])));
         let origin = &self.layout.rod_ends[rod][end].origin;
         EndFrameChange {
             origin: self.at_rest(framed.body, origin, &self.change.joint_points[text.joint]),

@@ -60,6 +60,8 @@ pub(super) struct Framed {
     pub body: BodyId,
     /// The body it is turned away from; none where the text aims one of the two, or there is no such body.
     pub other: Option<BodyId>,
+    /// Whether the joint names `body` before `other`: which way round the two turn where their ways are one.
+    pub leads: bool,
 }
 
 impl Framed {
@@ -70,17 +72,16 @@ impl Framed {
         let first = joint.bodies.first().copied().unwrap_or(0);
         let body = match joint.kind {
             JointKind::Slider => first,
-            _ => {
-                [ends[end], ends[1 - end]].into_iter().find(|b| joint.bodies.contains(b)).unwrap_or(first)
-            }
+            _ => [ends[end], ends[1 - end]].into_iter().find(|b| joint.bodies.contains(b)).unwrap_or(first),
         };
         let across = ends.into_iter().find(|b| *b != body && joint.bodies.contains(b));
-        let only = (joint.bodies.len() == 2)
-            .then(|| joint.bodies.iter().copied().find(|b| *b != body))
-            .flatten();
+        let only =
+            (joint.bodies.len() == 2).then(|| joint.bodies.iter().copied().find(|b| *b != body)).flatten();
         let aimed = |b: BodyId| joint.toward.iter().any(|(t, _)| *t == b);
         let other = across.or(only).filter(|b| !aimed(*b) && !aimed(body));
-        Self { body, other }
+        let place = |b: BodyId| joint.bodies.iter().position(|x| *x == b);
+        let leads = other.is_none_or(|o| place(body) < place(o));
+        Self { body, other, leads }
     }
 }
 
@@ -94,6 +95,8 @@ pub(super) struct Seen<T> {
     pub way: [T; 3],
     /// The same of the body it is turned away from.
     pub other: Option<[T; 3]>,
+    /// See [`Framed::leads`].
+    pub leads: bool,
 }
 
 /// Frames of both ends of every rod. `values`: the design's expressions.
@@ -105,19 +108,19 @@ pub(super) fn end_frames(design: &Design, motion: &Motion, values: &Evaluated) -
             let aim = Aim::of(design, rod.joint, body).drawn(values, &motion.joint_points);
             (motion.rest_point(body, &aim) - motion.rest_point(body, drawn)).into()
         };
-        let carried =
-            |body: BodyId, axis: [f64; 3]| motion.rest_direction(body, &Vector3::from(axis)).into();
+        let carried = |body: BodyId, axis: [f64; 3]| motion.rest_direction(body, &Vector3::from(axis)).into();
         let second = joint.bodies.get(1).copied().unwrap_or(framed.body);
         let seen = Seen {
             axis: carried(axis_carrier(joint, framed.body), joint.axis),
             second: carried(second, joint.second_axis.unwrap_or(joint.axis)),
             way: way(framed.body),
             other: framed.other.map(way),
+            leads: framed.leads,
         };
         RodEndFrame {
             body: [rod.from.body, rod.to.body][end],
             origin: motion.rest_point(framed.body, drawn),
-            axes: Matrix3::from_columns(&axes(joint, rod, end, &seen).map(Vector3::from)),
+            axes: Matrix3::from_columns(&axes(joint, rod, &seen).map(Vector3::from)),
         }
     };
     design.rods.iter().map(|rod| [0, 1].map(|end| frame(rod, end))).collect()
@@ -132,21 +135,26 @@ pub(super) fn axis_carrier(joint: &Joint, framed: BodyId) -> BodyId {
 }
 
 /// Columns e1, e2, e3.
-pub(super) fn axes<T: Real>(joint: &Joint, rod: &Rod, end: usize, seen: &Seen<T>) -> [[T; 3]; 3] {
+pub(super) fn axes<T: Real>(joint: &Joint, rod: &Rod, seen: &Seen<T>) -> [[T; 3]; 3] {
     let (e1, e3) = match joint.kind {
         JointKind::Ball => {
-            let z = [0.0, 0.0, 1.0].map(T::constant);
-            let sideways = if end == 0 { z } else { z.map(|x| -x) };
-            let e1 = opposed(unit(seen.way), seen.other.map(unit), sideways);
-            let steep = norm(cross(e1, z)).value() < ALONG_Z;
-            let seed = if steep { [1.0, 0.0, 0.0].map(T::constant) } else { z };
-            (e1, unit(flat(seed, e1)))
+            let up = |along: [T; 3]| {
+                let z = [0.0, 0.0, 1.0].map(T::constant);
+                let steep = norm(cross(along, z)).value() < ALONG_Z;
+                if steep { [1.0, 0.0, 0.0].map(T::constant) } else { z }
+            };
+            let way = unit(seen.way);
+            let sideways = if seen.leads { up(way) } else { up(way).map(|x| -x) };
+            let e1 = opposed(way, seen.other.map(unit), sideways);
+            (e1, unit(flat(up(e1), e1)))
         }
         JointKind::Universal => {
             let (first, second) = (unit(seen.axis), unit(seen.second));
             let square = unit(cross(first, second));
-            let way = opposed(unit(seen.way), seen.other.map(unit), first);
-            let e1 = if dot(way, square).value() < 0.0 { square.map(|x| -x) } else { square };
+            let away = dot(opposed(unit(seen.way), seen.other.map(unit), first), square).value();
+            // Two bodies as far from the plane of the axes as each other: the sides are told by the order of the bodies.
+            let even = seen.other.is_some() && away.abs() < SAME_WAY;
+            let e1 = if (even && !seen.leads) || (!even && away < 0.0) { square.map(|x| -x) } else { square };
             // Square to e1 as `first` is, whatever rounding made of the two axes.
             (e1, if rod.second_axis { unit(flat(second, first)) } else { first })
         }
@@ -159,7 +167,7 @@ pub(super) fn axes<T: Real>(joint: &Joint, rod: &Rod, end: usize, seen: &Seen<T>
             let e3 = unit(seen.axis);
             let plane = |way| unit(flat(way, e3));
             // Both ends turn the same way round where the two ways are one.
-            let sideways = if end == 0 { e3 } else { e3.map(|x| -x) };
+            let sideways = if seen.leads { e3 } else { e3.map(|x| -x) };
             (opposed(plane(seen.way), seen.other.map(plane), sideways), e3)
         }
     };

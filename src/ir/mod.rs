@@ -257,7 +257,9 @@ fn is_false(b: &bool) -> bool {
 }
 
 /// One end of a rod, in the end frame of its body at the joint, in the rest pose. Let w be the way from the joint
-/// point to the centroid of the body's other joint points (or to the `toward` point). e2 = e3 × e1 always, and of a
+/// point to the centroid of the body's other joint points (or to the `toward` point). Of a rod at a hinge, ball or universal
+/// joint between two bodies without a `toward` point, w_a and w_b are replaced by ±(w_a/|w_a| − w_b/|w_b|), so that both
+/// ends lie on one line. e2 = e3 × e1 always, and of a
 ///
 /// - hinge: e3 the axis, e1 along w, normal to e3;
 /// - ball: e1 along w, e3 world z (x where w is parallel to it), normal to e1;

@@ -132,7 +132,8 @@ impl JointValue {
     pub fn reference_derivative(&self, poses: &[Pose], change: &ReferenceChange) -> (f64, Gradient) {
         if let Self::Pull(pull) = self {
             let [a, b] = [pull.point_a, pull.point_b];
-            let rates = [change.twists[0].at(&a) + change.points[0], change.twists[1].at(&b) + change.points[1]];
+            let rates =
+                [change.twists[0].at(&a) + change.points[0], change.twists[1].at(&b) + change.points[1]];
             return pull.point_derivative(poses, rates);
         }
         let increments = change.increments(self.bodies().map(|b| &poses[b]));

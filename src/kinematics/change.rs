@@ -9,8 +9,8 @@ use super::mechanism::Mechanism;
 use super::motion::Motion;
 use super::path::DEAD_POINT;
 use super::value::JointValue;
-use crate::ir::{Design, Drive, DriveOn};
 use crate::ir::expr::Evaluated;
+use crate::ir::{Design, Drive, DriveOn};
 use crate::math::Pose;
 use nalgebra::{DMatrix, DVector, Vector3};
 
