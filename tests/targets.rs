@@ -141,6 +141,9 @@ fn tracking_a_direction() {
 
 #[test]
 fn the_papers_forms() {
+    if common::skipped() {
+        return;
+    }
     let mut design = Example::with("").design(6);
     for kind in [
         ObjectiveKind::PaperTorque { drive: 0, reference_n_mm: 10.0 },
