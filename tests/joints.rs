@@ -62,7 +62,7 @@ fn eye() -> String {
 }
 
 fn jansen() -> String {
-    // Ways of their own: leaves turned apart onto one line are too weak for the shaken designs to stay on one branch.
+    // Aimed along their own links: turned apart onto one line, shaken designs do not stay on one branch (not looked into).
     text(
         "jansen",
         &[
