@@ -65,12 +65,14 @@ fn ends_are_turned_apart_onto_one_line() {
             let [base, shin] = ends(&meeting(joint, clauses, b, t));
             assert!((base - want).norm() < EXACT && (shin + want).norm() < EXACT, "{clauses}: {base} {shin}");
         }
-        // Normal to both axes; where both links lie on one side of the joint, the nearer to the axes' plane gives way.
-        let [base, shin] = ends(&meeting(UNIVERSAL, "as universal_leaves", b, t));
-        assert!(
-            (base - Vector3::x()).norm() < EXACT && (shin + Vector3::x()).norm() < EXACT,
-            "{base} {shin}"
-        );
+        // Normal to both axes, of which the shin must not lie in the plane; the nearer to it gives way.
+        if cosine.abs() > 0.1 {
+            let [base, shin] = ends(&meeting(UNIVERSAL, "as universal_leaves", b, t));
+            assert!(
+                (base - Vector3::x()).norm() < EXACT && (shin + Vector3::x()).norm() < EXACT,
+                "{base} {shin}"
+            );
+        }
     }
 }
 

@@ -4,19 +4,11 @@
 
 mod common;
 
-use common::{example, table};
+use common::{example, skipped, table};
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
-
-fn skipped() -> bool {
-    let skip = std::env::var_os("FLEXURA_EXTENDED").is_none();
-    if skip {
-        eprintln!("skipped: set FLEXURA_EXTENDED=1 to run it");
-    }
-    skip
-}
 
 fn folder() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();

@@ -32,16 +32,25 @@ fn check(name: &str, steps: usize, moving: usize, nth: usize) {
 
 #[test]
 fn chebyshev() {
+    if common::skipped() {
+        return;
+    }
     check("chebyshev", 6, 6, 8);
 }
 
 #[test]
 fn car() {
+    if common::skipped() {
+        return;
+    }
     check("car", 4, 5, 5);
 }
 
 #[test]
 fn dragon() {
+    if common::skipped() {
+        return;
+    }
     check("dragon", 4, 5, 9);
 }
 
@@ -52,6 +61,9 @@ fn hand() {
 
 #[test]
 fn jansen() {
+    if common::skipped() {
+        return;
+    }
     check("jansen", 4, 3, 12);
 }
 

@@ -83,6 +83,9 @@ fn stress() {
 /// with flexure.
 #[test]
 fn collision() {
+    if common::skipped() {
+        return;
+    }
     for gap_mm in [4.0, 12.0] {
         check_gradient(ObjectiveKind::Collision { gap_mm });
     }

@@ -141,6 +141,9 @@ fn tracking_a_direction() {
 
 #[test]
 fn the_papers_forms() {
+    if common::skipped() {
+        return;
+    }
     let mut design = Example::with("").design(6);
     for kind in [
         ObjectiveKind::PaperTorque { drive: 0, reference_n_mm: 10.0 },
@@ -424,6 +427,9 @@ fn nothing_is_asked_of_an_idle_turn() {
 /// CMA-ES keeps the bounds and what was best, simulates a generation an iteration, and repeats itself bit by bit.
 #[test]
 fn cma_es_is_deterministic() {
+    if common::skipped() {
+        return;
+    }
     use flexura::optimize::{Method, optimize};
     let design = Example::with("").terms("track(tip, scale = 1 mm)").design(8);
     let layout = layout(&design);

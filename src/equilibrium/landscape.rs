@@ -19,6 +19,8 @@ const SAME: f64 = 1e-9;
 /// Energy that work along the path does not account for, relative to the range of the energy: beyond it, if
 /// halving the step does not help, the mechanism snapped.
 const LOST: f64 = 1e-2;
+/// A mechanism whose energy changes by less has stored nothing but rounding, N mm.
+const STORES_N_MM: f64 = 1e-15;
 /// Halvings by which a snap is found.
 const HALVINGS: usize = 10;
 
@@ -211,7 +213,7 @@ impl<'m, 'l> Path<'m, 'l> {
                 let [a, b] = halves;
                 ends = if later == 1 { b } else { a };
             }
-            if now.abs() > LOST * range && range > 0.0 {
+            if now.abs() > LOST * range && range > STORES_N_MM {
                 let drives = from.iter().zip(&self.model.layout.drives).map(|(v, d)| v + d.rest).collect();
                 out.push(Snap { state: s, drives, lost_n_mm: now.abs() });
             }

@@ -54,3 +54,12 @@ pub fn noise(seed: u64, n: usize) -> Vec<f64> {
     };
     (0..n).map(|_| next()).collect()
 }
+
+/// Whether what takes long is left out here (see `tests/extended.rs`); says so.
+pub fn skipped() -> bool {
+    let skip = std::env::var_os("FLEXURA_EXTENDED").is_none();
+    if skip {
+        eprintln!("skipped: set FLEXURA_EXTENDED=1 to run it");
+    }
+    skip
+}
