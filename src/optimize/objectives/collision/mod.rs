@@ -87,8 +87,7 @@ impl Collision {
             .zip(&view.equilibrium.state.rods)
             .zip(&self.copies)
             .map(|((rod, state), copies)| {
-                let q = rod.rod.parameters();
-                rod_strips(state, rod.rod.options().section, [q.a, q.b], *copies)
+                rod_strips(state, &rod.rod, *copies)
             })
             .collect();
         let mut compare = |a: (Source, &Strip), b: (Source, &Strip), gap: f64| {
