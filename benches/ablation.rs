@@ -99,10 +99,9 @@ fn variant(arguments: &Arguments, terms: &str) -> Result<Design, String> {
         let line = text.lines().find_map(|l| l.trim_start().strip_prefix(word));
         line.and_then(|l| l.split_whitespace().next()).expect("a trace and a drive").to_string()
     };
-    let terms = terms.replace("(tip", &format!("({}", named("trace "))).replace(
-        "(motor",
-        &format!("({}", named("drive ")),
-    );
+    let terms = terms
+        .replace("(tip", &format!("({}", named("trace ")))
+        .replace("(motor", &format!("({}", named("drive ")));
     let text = format!("{}    minimize {{ {terms} }}\n{}", kept(&text[..from]), kept(&text[to..]));
     let name = arguments.design.file_name().unwrap().to_str().unwrap().to_string();
     let folder = arguments.design.parent().unwrap().to_path_buf();

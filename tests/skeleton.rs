@@ -32,18 +32,20 @@ fn capsules(design: &Design, layout: &Layout, p: &[f64]) -> Vec<SkeletonCapsule>
     for plan in &plans {
         assert_eq!(plan.slots.len(), plan.follows.len());
     }
-    skeleton_capsules(&plans, &model, p.len())
+    skeleton_capsules(design, &plans, &model)
 }
 
 fn numbers(c: &SkeletonCapsule) -> Vec<f64> {
-    let vectors = [c.ends[0], c.ends[1], c.fan];
+    // A fan of no width has no direction.
+    let vectors = [c.ends[0], c.ends[1], c.fan * c.spread_mm];
     let mut all: Vec<f64> = vectors.iter().flat_map(|v| v.iter().copied()).collect();
     all.extend([c.spread_mm, c.radius_mm]);
     all
 }
 
 fn derivatives(c: &SkeletonCapsule, column: usize) -> Vec<f64> {
-    let columns = [&c.d_ends_dp[0], &c.d_ends_dp[1], &c.d_fan_dp];
+    let fan = &c.d_fan_dp * c.spread_mm + c.fan * &c.d_spread_dp;
+    let columns = [&c.d_ends_dp[0], &c.d_ends_dp[1], &fan];
     let mut all: Vec<f64> =
         columns.iter().flat_map(|m| m.column(column).iter().copied().collect::<Vec<_>>()).collect();
     all.extend([c.d_spread_dp[column], c.d_radius_dp[column]]);
@@ -53,16 +55,44 @@ fn derivatives(c: &SkeletonCapsule, column: usize) -> Vec<f64> {
 #[test]
 fn capsules_follow_every_parameter() {
     let (design, layout) = example();
+    follow(&design, &layout, &[2, 5, 9], 200);
+}
+
+/// A mechanism of `tests/mechanisms`, its text changed by `edit`.
+fn mechanism(name: &str, edit: impl Fn(String) -> String) -> (Design, Layout) {
+    let path = format!("{}/tests/mechanisms/{name}.mech", env!("CARGO_MANIFEST_DIR"));
+    let design = common::gradient::design(&edit(std::fs::read_to_string(path).unwrap()), 4);
+    let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
+    let layout = common::gradient::layout(&design, &start);
+    (design, layout)
+}
+
+/// Bodies in space: nets of round bars, stubs upright along the leaves' wide directions.
+#[test]
+fn capsules_in_space_follow_every_parameter() {
+    for name in ["car", "dragon", "eye"] {
+        let (design, layout) = mechanism(name, |text| text);
+        follow(&design, &layout, &[2, 5], 400);
+    }
+    // Thick wires: the stubs' radius follows.
+    let thick =
+        |text: String| text.replace("as wire", "as wire { diameter = free 4 mm in 3.5 mm .. 4.5 mm }");
+    let (design, layout) = mechanism("dragon", thick);
+    follow(&design, &layout, &[3], 400);
+}
+
+/// Derivatives of all capsules against differences; at least `least` numbers must move.
+fn follow(design: &Design, layout: &Layout, seeds: &[u64], least: usize) {
     let mut moving = 0;
-    for seed in [2, 5, 9] {
-        let p = common::shaken(&design, seed);
-        let at = capsules(&design, &layout, &p);
+    for seed in seeds.iter().copied() {
+        let p = common::shaken(design, seed);
+        let at = capsules(design, layout, &p);
         for (i, free) in design.free.iter().enumerate() {
             let h = STEP * (free.upper - free.lower);
             let shifted = |by: f64| {
                 let mut q = p.clone();
                 q[i] += by;
-                capsules(&design, &layout, &q)
+                capsules(design, layout, &q)
             };
             let (more, less) = (shifted(h), shifted(-h));
             assert_eq!((at.len(), at.len()), (more.len(), less.len()), "the net of nodes stays");
@@ -82,7 +112,7 @@ fn capsules_follow_every_parameter() {
             }
         }
     }
-    assert!(moving > 200, "{moving}");
+    assert!(moving > least, "{moving}");
 }
 
 /// Every capsule of a fan lies inside its slot and reaches its faces.
@@ -93,7 +123,7 @@ fn fans_fill_their_slots() {
     let model = Model::new(&design, &layout, &p, EDGES, true).unwrap();
     let plans = plan_bodies(&parts_input(&design, &layout, &model)).unwrap();
     let axis = Vector3::from(design.layers.axis);
-    let all = skeleton_capsules(&plans, &model, p.len());
+    let all = skeleton_capsules(&design, &plans, &model);
     for (body, plan) in plans.iter().enumerate() {
         let of_body: Vec<_> = all.iter().filter(|c| c.body == body).collect();
         for (role, slot) in &plan.slots {

@@ -1,11 +1,14 @@
 //! How the layout moves with the free variables of the geometry: joint points, rest drive values, traces. Everything a
 //! body carries moves with its rest pose; drawn points move besides.
 
+use super::design_load::{LayoutLoad, LayoutLoadKind};
 use super::frames::{Aim, Framed, Seen, axes, axis_carrier};
 use super::layout::Layout;
+use super::load::{PointForce, PointForceChange};
 use super::target::as_curve;
+use super::weight;
 use crate::ir::expr::Evaluated;
-use crate::ir::{BodyId, Design, ExprPoint, JointId, TargetOf};
+use crate::ir::{BodyId, Design, ExprPoint, JointId, Load, LoadKind, TargetOf};
 use crate::kinematics::{Constraint, Motion, MotionChange, ReferenceChange, Twist, motion_changes};
 use crate::math::dual::Dual;
 use nalgebra::{Matrix3, Matrix3xX, Vector3};
@@ -23,6 +26,8 @@ pub struct LayoutChange {
     pub constraints: Vec<ReferenceChange>,
     /// Per drive.
     pub drives: Vec<DriveChange>,
+    /// Per load, of its forces of size one: of gravity one a link, of a moment none.
+    pub loads: Vec<Vec<PointForceChange>>,
     /// Per trace.
     pub traces: Vec<TraceChange>,
     /// Per traced direction.
@@ -146,6 +151,7 @@ impl Making<'_> {
             rod_ends,
             constraints,
             drives,
+            loads: self.loads(),
             traces: traces.collect(),
             directions: directions.collect(),
             bodies: self.change.rest,
@@ -159,6 +165,34 @@ impl Making<'_> {
 
     fn carried(&self, body: BodyId, drawn: &Vector3<f64>) -> Vector3<f64> {
         self.layout.rest_poses[body].direction(drawn)
+    }
+
+    /// Derivative of a point as drawn.
+    fn drawn(&self, point: &ExprPoint) -> Vector3<f64> {
+        let by = |id| self.values.gradient(id).get(self.change.parameter).copied().unwrap_or(0.0);
+        Vector3::from(point.map(by))
+    }
+
+    fn loads(&self) -> Vec<Vec<PointForceChange>> {
+        let height_mm = self.design.layers.height_mm;
+        let of = |(text, laid): (&Load, &LayoutLoad)| match (&text.kind, &laid.kind) {
+            (LoadKind::Force { point, .. }, LayoutLoadKind::Force(force)) => vec![PointForceChange {
+                rest: self.at_rest(force.body, &force.rest, &self.drawn(point)),
+                force_n: Vector3::zeros(),
+            }],
+            (_, LayoutLoadKind::Gravity { specific_n_mm3, links }) => {
+                let link = |force: &PointForce| {
+                    let skeleton = &self.design.bodies[force.body].skeleton;
+                    let at: Vec<_> = skeleton.iter().map(|p| self.values.point(p.position)).collect();
+                    let rates: Vec<_> = skeleton.iter().map(|p| self.drawn(&p.position)).collect();
+                    let pose = (&self.layout.rest_poses[force.body], &self.change.rest[force.body]);
+                    weight::link_change(&at, &rates, height_mm, pose, specific_n_mm3)
+                };
+                links.iter().map(link).collect()
+            }
+            _ => Vec::new(),
+        };
+        self.design.loads.iter().zip(&self.layout.loads).map(of).collect()
     }
 
     fn end_frame(&self, rod: usize, end: usize) -> EndFrameChange {
@@ -190,10 +224,7 @@ impl Making<'_> {
         let aim = Aim::of(self.design, joint, body);
         let drawn = aim.drawn(self.values, &self.motion.joint_points);
         let by_drawn = match aim {
-            Aim::Point(q) => {
-                let by = |id| self.values.gradient(id).get(self.change.parameter).copied().unwrap_or(0.0);
-                Vector3::from(q.map(by))
-            }
+            Aim::Point(q) => self.drawn(&q),
             Aim::Joints(all) => {
                 let sum: Vector3<f64> = all.iter().map(|k| self.change.joint_points[*k]).sum();
                 sum / all.len().max(1) as f64

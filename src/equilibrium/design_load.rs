@@ -2,7 +2,7 @@
 //! to its constraints: a state is told by its controls, the drive values and then the sizes of the loads.
 
 use super::layout::Layout;
-use super::load::PointForce;
+use super::load::{PointForce, PointForceChange};
 use super::model::{Model, State};
 use super::newton::Solver;
 use super::saddle::{scatter, scatter_matrix};
@@ -79,6 +79,29 @@ impl LayoutLoad {
             LayoutLoadKind::Force(one) => force(one, f),
             LayoutLoadKind::Moment(turn) => f([turn.a, turn.b], &-turn.gradient(poses)),
             LayoutLoadKind::Gravity { links, .. } => links.iter().for_each(|l| force(l, f)),
+        }
+    }
+
+    /// Adds to `out` how the gradient on the links changes at fixed poses, per force as in [`super::LayoutChange::loads`]. A
+    /// moment's turn counts from the rest pose, wherever that is.
+    pub(super) fn add_gradient_change(
+        &self,
+        model: &Model,
+        state: &State,
+        changes: &[PointForceChange],
+        size: f64,
+        out: &mut DVector<f64>,
+    ) {
+        let forces = match &self.kind {
+            LayoutLoadKind::Force(one) => std::slice::from_ref(one),
+            LayoutLoadKind::Moment(_) => &[],
+            LayoutLoadKind::Gravity { links, .. } => links,
+        };
+        for (force, change) in forces.iter().zip(changes) {
+            if let Some(first) = model.layout.bodies[force.body].first_dof {
+                let mut rows = out.fixed_rows_mut::<6>(first);
+                rows += force.gradient_change(&state.poses[force.body], change) * size;
+            }
         }
     }
 

@@ -105,7 +105,7 @@ impl SensitivityWorkspace {
         }
         for (i, change) in model.layout.changes.iter().flatten().enumerate() {
             let mut by = DVector::zeros(n + m);
-            geometry_column(model, &equilibrium.state, change, &mut by);
+            geometry_column(model, &equilibrium.state, &solver.sizes, change, &mut by);
             let changes = load_changes.get(i).map_or(&[][..], |c| c);
             for (load, change) in loads.iter().zip(changes) {
                 if let Some(first) = model.layout.bodies[load.body].first_dof {
@@ -150,10 +150,19 @@ impl SensitivityWorkspace {
     }
 }
 
-/// Derivative of what the constraints and drives add to the gradient, and of their residuals, at fixed poses when the
+/// Derivative of what the constraints, drives and loads of the design add to the gradient, and of their residuals, at fixed poses when the
 /// layout moves. Bodies keep their increments' centres: where forces balance it does not matter what they are.
-fn geometry_column(model: &Model, state: &State, change: &LayoutChange, out: &mut DVector<f64>) {
+fn geometry_column(
+    model: &Model,
+    state: &State,
+    sizes: &[f64],
+    change: &LayoutChange,
+    out: &mut DVector<f64>,
+) {
     let n = model.layout.dofs();
+    for ((load, moved), size) in model.layout.loads.iter().zip(&change.loads).zip(sizes) {
+        load.add_gradient_change(model, state, moved, *size, out);
+    }
     let mut row = 0;
     for (constraint, moved) in model.layout.constraints.iter().zip(&change.constraints) {
         let lambda = &state.lambda[row..row + constraint.rows()];

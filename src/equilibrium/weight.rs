@@ -2,12 +2,13 @@
 //! links' height and width along the shortest tree through its points, with round ends. Bosses, stubs towards
 //! flexures, bores and rounded edges are not in it: of Chebyshev's printed part it sees 82 % (`tests/weight.rs`).
 
-use super::load::PointForce;
+use super::load::{PointForce, PointForceChange};
 use crate::geometry::link::BAR_PER_HEIGHT;
 use crate::geometry::skeleton::spanning_tree;
 use crate::ir::expr::ExprId;
 use crate::ir::{Design, Material};
-use crate::kinematics::Motion;
+use crate::kinematics::{Motion, Twist};
+use crate::math::Pose;
 use nalgebra::Vector3;
 use std::f64::consts::PI;
 
@@ -39,27 +40,63 @@ pub(super) fn links(
         .collect()
 }
 
+/// How that of a link changes when its drawn points move by `rates` and its rest pose by `twist`.
+pub(super) fn link_change(
+    points: &[Vector3<f64>],
+    rates: &[Vector3<f64>],
+    height_mm: f64,
+    (rest, twist): (&Pose, &Twist),
+    specific_n_mm3: &Vector3<f64>,
+) -> PointForceChange {
+    let [(_, center), (volume, moved)] = volume_and_center_moving(points, rates, height_mm);
+    PointForceChange {
+        rest: twist.at(&rest.point(&center)) + rest.direction(&moved),
+        force_n: specific_n_mm3 * volume,
+    }
+}
+
 /// Volume (mm³) and centre of mass of the bars through points.
 pub fn volume_and_center(points: &[Vector3<f64>], height_mm: f64) -> (f64, Vector3<f64>) {
+    let still = vec![Vector3::zeros(); points.len()];
+    let [value, _] = volume_and_center_moving(points, &still, height_mm);
+    value
+}
+
+/// The same, and their derivatives when the points move by `rates`. Which points are joined is taken as it is.
+pub(super) fn volume_and_center_moving(
+    points: &[Vector3<f64>],
+    rates: &[Vector3<f64>],
+    height_mm: f64,
+) -> [(f64, Vector3<f64>); 2] {
     let radius = height_mm * BAR_PER_HEIGHT;
     let disc = PI * radius * radius * height_mm;
     let bars = spanning_tree(points.len(), &|i, j| (points[i] - points[j]).norm());
-    let mut parts: Vec<(f64, Vector3<f64>)> = bars
+    let section = 2.0 * radius * height_mm;
+    // Volume and centre of each part, then their rates.
+    let mut parts: Vec<[(f64, Vector3<f64>); 2]> = bars
         .iter()
         .map(|&(i, j)| {
-            let (p, q) = (points[i], points[j]);
-            (2.0 * radius * height_mm * (p - q).norm(), (p + q) / 2.0)
+            let (way, rate) = (points[i] - points[j], rates[i] - rates[j]);
+            let length = way.norm();
+            let longer = way.dot(&rate) / length.max(f64::MIN_POSITIVE);
+            let (middle, moved) = ((points[i] + points[j]) / 2.0, (rates[i] + rates[j]) / 2.0);
+            [(section * length, middle), (section * longer, moved)]
         })
         .collect();
-    for (i, p) in points.iter().enumerate() {
+    for (i, (p, rate)) in points.iter().zip(rates).enumerate() {
         match bars.iter().filter(|(a, b)| *a == i || *b == i).count() {
-            0 => parts.push((disc, *p)),
-            1 => parts.push((disc / 2.0, *p)),
+            0 => parts.push([(disc, *p), (0.0, *rate)]),
+            1 => parts.push([(disc / 2.0, *p), (0.0, *rate)]),
             _ => {}
         }
     }
-    let volume: f64 = parts.iter().map(|p| p.0).sum();
-    let moment: Vector3<f64> = parts.iter().map(|(v, at)| at * *v).sum();
-    let center = if volume > 0.0 { moment / volume } else { Vector3::zeros() };
-    (volume, center)
+    let volume: f64 = parts.iter().map(|[p, _]| p.0).sum();
+    let more: f64 = parts.iter().map(|[_, d]| d.0).sum();
+    let moment: Vector3<f64> = parts.iter().map(|[(v, at), _]| at * *v).sum();
+    let by_moment: Vector3<f64> = parts.iter().map(|[(v, at), (dv, d)]| at * *dv + d * *v).sum();
+    if volume <= 0.0 {
+        return [(volume, Vector3::zeros()), (more, Vector3::zeros())];
+    }
+    let center = moment / volume;
+    [(volume, center), (more, (by_moment - center * more) / volume)]
 }

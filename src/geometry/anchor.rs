@@ -3,14 +3,17 @@
 
 use super::skeleton::median_derivative;
 use crate::equilibrium::ModelRod;
+use crate::kinematics::Twist;
 use nalgebra::{Matrix3, Matrix3xX, RowDVector, Vector3};
 
 /// What a point of a link follows, in the rest pose.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Anchor {
-    /// Nothing: it is given by the conventional mechanism.
+    /// No flexure: what the conventional mechanism's body has drawn there, or else carries there.
     #[default]
     Fixed,
+    /// As another point of the body that follows no flexure: a fixed way from it.
+    Beside(Vector3<f64>),
     /// The end of a flexure: a fixed way from its attachment, along its outward tangent laid into the plane
     /// normal to the stacking axis.
     Stub {
@@ -75,6 +78,8 @@ pub struct Follow {
     pub radius: SizeBy,
     /// Its outer half height.
     pub half_height: SizeBy,
+    /// The end whose wide direction its axis is; none: the axis is fixed in the body.
+    pub upright: Option<FlexureEnd>,
 }
 
 impl Follow {
@@ -89,33 +94,65 @@ impl Follow {
     }
 }
 
-/// Derivatives of what anchors follow by the n design parameters.
+/// A point of a body's drawing, with its derivative.
+#[derive(Clone, Debug)]
+pub struct DrawnPoint {
+    /// In the rest pose, mm.
+    pub at: Vector3<f64>,
+    /// By the n design parameters, 3 × n.
+    pub by: Matrix3xX<f64>,
+}
+
+/// Derivatives of what anchors of one body follow by the n design parameters.
 pub struct Followed<'m> {
     /// The rods, in the order of the flexures.
     pub rods: &'m [ModelRod],
+    /// How the rest pose moves what the body carries, per free variable that moves it.
+    pub carried: Vec<(usize, Twist)>,
+    /// Points and joints of the body, as far as free variables move its drawing or rest pose.
+    pub drawn: Vec<DrawnPoint>,
+    /// Axis of the body's layers, along which what is drawn at another height is meant.
+    pub axis: Option<Vector3<f64>>,
     /// Number of design parameters.
     pub parameters: usize,
 }
 
+/// Drawn points nearer than this in plan are the same, mm.
+const SAME_MM: f64 = 1e-6;
+
 impl Followed<'_> {
-    /// Derivative of a point, 3 × n.
-    pub fn point(&self, anchor: &Anchor) -> Matrix3xX<f64> {
+    /// Derivative of a point that follows no flexure, 3 × n.
+    fn fixed(&self, at: &Vector3<f64>) -> Matrix3xX<f64> {
+        let flat = |d: Vector3<f64>| self.axis.map_or(d, |axis| d - axis * d.dot(&axis));
+        if let Some(point) = self.drawn.iter().find(|q| flat(q.at - at).norm() < SAME_MM) {
+            return point.by.clone();
+        }
+        let mut by = Matrix3xX::zeros(self.parameters);
+        for (parameter, twist) in &self.carried {
+            by.set_column(*parameter, &twist.at(at));
+        }
+        by
+    }
+
+    /// Derivative of a point, 3 × n; `at` is the point.
+    pub fn point(&self, anchor: &Anchor, at: &Vector3<f64>) -> Matrix3xX<f64> {
         match anchor {
-            Anchor::Fixed => Matrix3xX::zeros(self.parameters),
+            Anchor::Fixed => self.fixed(at),
+            Anchor::Beside(point) => self.fixed(point),
             Anchor::Stub { end, along_mm, along, level } => self.stub(end, *along_mm, along, level),
             Anchor::Hub { nodes, at } => {
                 let points: Vec<Vector3<f64>> = nodes.iter().map(|n| n.0).collect();
                 let mut sum = Matrix3xX::zeros(self.parameters);
-                for ((_, anchor), by) in nodes.iter().zip(median_derivative(&points, at)) {
-                    if *anchor != Anchor::Fixed {
-                        sum += by * self.point(anchor);
+                for ((point, anchor), by) in nodes.iter().zip(median_derivative(&points, at)) {
+                    if *anchor != Anchor::Fixed || !self.drawn.is_empty() {
+                        sum += by * self.point(anchor, point);
                     }
                 }
                 sum
             }
             Anchor::Toward { nodes, along_mm } => {
                 let [(p, from), (q, to)] = nodes.as_ref();
-                let (d, (from, to)) = (q - p, (self.point(from), self.point(to)));
+                let (d, (from, to)) = (q - p, (self.point(from, p), self.point(to, q)));
                 let length = d.norm();
                 if length <= 0.0 {
                     return from;
@@ -124,7 +161,7 @@ impl Followed<'_> {
                 let turn = (Matrix3::identity() - u * u.transpose()) * (*along_mm / length);
                 &from + turn * (to - &from)
             }
-            Anchor::Middle(pair) => (self.point(&pair[0]) + self.point(&pair[1])) * 0.5,
+            Anchor::Middle(pair) => (self.point(&pair[0], at) + self.point(&pair[1], at)) * 0.5,
         }
     }
 
@@ -145,6 +182,26 @@ impl Followed<'_> {
         Matrix3xX::from_columns(
             &out.column_iter().map(|c| Vector3::new(c[0], c[1], c[2])).collect::<Vec<_>>(),
         )
+    }
+
+    /// Derivative of the wide direction at an end, 3 × n: of the joint's axis laid normal to the tangent there.
+    pub fn wide(&self, end: &FlexureEnd) -> Matrix3xX<f64> {
+        let Some(rod) = self.rods.get(end.flexure) else { return Matrix3xX::zeros(self.parameters) };
+        let q = rod.rod.parameters();
+        let (derivative, row) = if end.at_end { (q.derivative_b, 9) } else { (q.derivative_a, 3) };
+        let length = derivative.norm().max(f64::MIN_POSITIVE);
+        let t = derivative / length;
+        let across = q.axis - t * q.axis.dot(&t);
+        let size = across.norm().max(f64::MIN_POSITIVE);
+        let m = across / size;
+        let unit = |u: &Vector3<f64>, size: f64| (Matrix3::identity() - u * u.transpose()) / size;
+        let by_tangent = -(t * q.axis.transpose() + Matrix3::identity() * q.axis.dot(&t)) * unit(&t, length);
+        let by_axis = Matrix3::identity() - t * t.transpose();
+        let rows = |first: usize| {
+            let d = rod.dq_dp.rows(first, 3);
+            Matrix3xX::from_fn(self.parameters, |r, c| d[(r, c)])
+        };
+        unit(&m, size) * (by_tangent * rows(row) + by_axis * rows(12))
     }
 
     /// Derivative of a length, 1 × n.

@@ -412,6 +412,7 @@ impl Builder<'_> {
                 sized_by: Some(end),
                 radius: radius_by,
                 half_height: half_by,
+                upright: None,
             },
         );
         let anchor = along(reach, SizeBy::default(), SizeBy::default());

@@ -45,7 +45,7 @@ mod wall;
 mod tests;
 
 pub use anchor::{Anchor, FlexureEnd, Follow, SizeBy};
-pub use capsules::{SkeletonCapsule, skeleton_capsules};
+pub use capsules::{SkeletonCapsule, follows_geometry, skeleton_capsules};
 pub use carve::{Carving, Cut, carve};
 pub use check::{MeshFacts, check_mesh};
 pub use cycle::{CycleGaps, LeastGap, MovedState, carved_cycle_gaps, cycle_gaps};

@@ -5,7 +5,7 @@
 //! two ends would carry it, and of other bodies their eyes, the bars between them and their stubs count. The gaps of the
 //! finished solids over the cycle are measured later.
 
-use super::anchor::Anchor;
+use super::anchor::{Anchor, Follow};
 use super::distance::separation;
 use super::gap::ROOT_MM;
 use super::link::{
@@ -180,9 +180,11 @@ impl Builder<'_> {
             let span = (level - half, level + half);
             match self.foot(&shape.center, span, radius, arm) {
                 Some(foot) => {
-                    self.push(Role::Bar, arm(&foot));
-                    self.column(Role::Riser, &foot, span, radius, &Anchor::Fixed);
-                    self.node(foot, None, Anchor::Fixed);
+                    let beside = Anchor::Beside(eye.point);
+                    let follow = Follow::bar([Anchor::Fixed, beside.clone()]);
+                    self.push_following(Role::Bar, arm(&foot), follow);
+                    self.column(Role::Riser, &foot, span, radius, &beside);
+                    self.node(foot, None, beside);
                 }
                 None => {
                     self.plan.notes.push(format!(

@@ -113,6 +113,7 @@ impl Builder<'_> {
             sized_by: Some(end),
             radius: by_a,
             half_height: by_a,
+            upright: None,
         };
         let wide = if at_end { flexure.m2.last() } else { flexure.m2.first() }.copied().unwrap_or_default();
         if b + wall <= radius {
@@ -128,6 +129,7 @@ impl Builder<'_> {
             let more = if same.into_iter().any(beside) { 0.0 } else { wall };
             let nudge = 0.5 * SPREAD_MM * spread(2 * index + usize::from(at_end));
             let half_height = b + more - STUB_BELOW_MM - nudge;
+            follow.upright = Some(end);
             follow.half_height = SizeBy { b: 1.0, ..SizeBy::default() };
             if half_height <= LEAST_HALF_MM {
                 follow.half_height = SizeBy::default();
@@ -175,8 +177,9 @@ impl Builder<'_> {
         };
         let best = (0..NECK_DIRECTIONS).map(neck).min_by(|s, t| cost(s).total_cmp(&cost(t)));
         let Some(best) = best else { return };
-        self.push(Role::Bar, best);
-        self.nodes.push(Node { at: best.end, own_eye: None, anchor: Anchor::Fixed });
+        let beside = Anchor::Beside(eye.point);
+        self.push_following(Role::Bar, best, Follow::bar([Anchor::Fixed, beside.clone()]));
+        self.nodes.push(Node { at: best.end, own_eye: None, anchor: beside });
     }
 
     /// Whether a bar or ball would run into a flexure, another body's stub, or the room of a hinge.

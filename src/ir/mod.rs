@@ -76,7 +76,8 @@ pub struct Design {
 }
 
 impl Design {
-    /// Indices of the free variables that move the conventional mechanism, its rest pose, or end frames of flexures.
+    /// Indices of the free variables that move the conventional mechanism, its rest pose, end frames of flexures, or
+    /// where loads act.
     pub fn geometry_variables(&self) -> Vec<usize> {
         let mut roots: Vec<ExprId> = Vec::new();
         for joint in &self.joints {
@@ -86,6 +87,17 @@ impl Design {
         roots.extend(self.traces.iter().flat_map(|t| t.point));
         roots.extend(self.strings.iter().flat_map(|c| c.via.iter().flatten().chain(&c.point)));
         roots.extend(self.drives.iter().filter_map(|d| d.free_rest));
+        for load in &self.loads {
+            match &load.kind {
+                LoadKind::Force { point, .. } => roots.extend(point),
+                // Links are weighed by their skeletons.
+                LoadKind::Gravity { .. } => {
+                    let points = self.bodies.iter().flat_map(|b| &b.skeleton);
+                    roots.extend(points.flat_map(|p| p.position));
+                }
+                LoadKind::Moment { .. } => {}
+            }
+        }
         self.exprs.free_variables(&roots).into_iter().collect()
     }
 }

@@ -165,7 +165,7 @@ impl<'d> Problem<'d> {
         let model = Model::new(self.design, layout, &p, self.edges, true).ok()?;
         let cycle = sweep(&model).ok()?;
         let loaded = self.load(&model, &cycle, &cases)?;
-        let capsules = self.links(&model, p.len())?;
+        let capsules = self.links(&model)?;
         let views: Vec<StateView> = (0..self.layout.counted_states())
             .map(|s| self.view(&model, &cycle, &loaded, &capsules, s))
             .collect();
@@ -213,12 +213,12 @@ impl<'d> Problem<'d> {
     }
 
     /// The links' shapes, where a term sees them; none where a link has none.
-    fn links(&self, model: &Model<'d>, parameters: usize) -> Option<Vec<SkeletonCapsule>> {
+    fn links(&self, model: &Model<'d>) -> Option<Vec<SkeletonCapsule>> {
         if !self.needs_links {
             return Some(Vec::new());
         }
         let plans = plan_bodies(&parts_input(self.design, &model.layout, model)).ok()?;
-        Some(skeleton_capsules(&plans, model, parameters))
+        Some(skeleton_capsules(self.design, &plans, model))
     }
 
     /// Equilibria under the load cases; none where one cannot be found.

@@ -8,12 +8,12 @@ use super::report::Artefact;
 use super::solids;
 use super::stability;
 use super::stages::{Checked, Failed, Simulation, Solved, Stages};
-use crate::diagnostic::Diagnostic;
+use crate::diagnostic::{Diagnostic, Origin};
 use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
 use crate::emit::stl::stl_bytes;
 use crate::equilibrium::{Cycle, Equilibrium, Layout, Model, ModelError, SweepError, sweep};
-use crate::geometry::parts_input;
+use crate::geometry::{follows_geometry, parts_input};
 use crate::ir::{Assembly, Design, DriveOn, ObjectiveKind, Solution};
 use crate::kinematics::{Constraint, Motion, solve_motion};
 use crate::math::{Pose, log_so3};
@@ -137,6 +137,9 @@ impl Stages for Compiler {
             };
             solids::available(design)
                 .map_err(|found| found.into_iter().map(asks).collect::<Vec<Diagnostic>>())?;
+            if !follows_geometry(design) {
+                return Err(vec![not_followed(design, term.origin)]);
+            }
             solids::plannable(design, &layout, start, EDGES)?;
         }
         let problem = Problem::new(design, &layout, EDGES);
@@ -242,6 +245,18 @@ fn dead_point(design: &Design) -> Diagnostic {
     Diagnostic::error("E0612", message, first.map_or(design.origin, |f| f.origin))
         .label("this moves points of the mechanism, or its rest pose")
         .help("shift the drive's range a little, take another number of steps, or write a number here")
+}
+
+/// The objective sees links whose form cannot be followed exactly when the mechanism's own geometry varies.
+fn not_followed(design: &Design, term: Origin) -> Diagnostic {
+    let message = "`collision` cannot follow free points yet in a mechanism in space or with a sliding pair";
+    let points = design.bodies.iter().flat_map(|b| &b.skeleton).flat_map(|p| p.position);
+    let drawn = design.exprs.free_variables(&points.collect::<Vec<_>>()).into_iter().next();
+    let first = design.geometry_variables().first().copied().or(drawn).and_then(|i| design.free.get(i));
+    Diagnostic::error("E0613", message, first.map_or(design.origin, |f| f.origin))
+        .label("this moves points of the mechanism, or its rest pose")
+        .also(term, "this term sees the printed form")
+        .help("write a number here, or leave `collision` out")
 }
 
 fn table(design: &Design, has_forces: bool, states: Vec<MotionState>) -> MotionTable {

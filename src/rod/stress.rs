@@ -206,6 +206,16 @@ impl Rod {
         station_widths(&self.sections, k)
     }
 
+    /// Half widths (a, b) at the middle of edge `j`, mm.
+    pub fn edge_half_widths_mm(&self, j: usize) -> [f64; 2] {
+        self.sections.get(j).copied().unwrap_or_default()
+    }
+
+    /// Share of the widths at end B in those of edge `j`: zero unless the rod is tapered.
+    pub fn taper_at_edge(&self, j: usize) -> f64 {
+        if self.options().taper { j as f64 / (self.edges - 1) as f64 } else { 0.0 }
+    }
+
     /// Quadrature weights of the stations (trapezia over the rest length), of sum 1.
     pub fn station_weights(&self) -> Vec<f64> {
         let n = self.edges;

@@ -86,10 +86,7 @@ impl Collision {
             .iter()
             .zip(&view.equilibrium.state.rods)
             .zip(&self.copies)
-            .map(|((rod, state), copies)| {
-                let q = rod.rod.parameters();
-                rod_strips(state, rod.rod.options().section, [q.a, q.b], *copies)
-            })
+            .map(|((rod, state), copies)| rod_strips(state, &rod.rod, *copies))
             .collect();
         let mut compare = |a: (Source, &Strip), b: (Source, &Strip), gap: f64| {
             if let Some((value, by)) = strips(a.1, b.1, gap) {

@@ -5,7 +5,7 @@ use super::kernel::{GAUSS_3, near};
 use crate::equilibrium::{Model, Sensitivity};
 use crate::geometry::SkeletonCapsule;
 use crate::math::{Pose, skew};
-use crate::rod::{RodState, SectionShape};
+use crate::rod::{Rod, RodState, SectionShape};
 use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
 
 /// Simpson's rule on −1..1, weights of sum 1.
@@ -157,15 +157,17 @@ pub fn strips(a: &Strip, b: &Strip, gap_mm: f64) -> Option<(f64, [StripGradient;
     Some((mean * la * lb, by))
 }
 
-/// The edges of a rod between its attachment planes, the middles of its first and last edge. `half_widths` (a, b), mm.
-pub fn rod_strips(state: &RodState, shape: SectionShape, half_widths: [f64; 2], copies: usize) -> Vec<Strip> {
+/// The edges of a rod between its attachment planes, the middles of its first and last edge, each as wide
+/// as the rod is there.
+pub fn rod_strips(state: &RodState, rod: &Rod, copies: usize) -> Vec<Strip> {
     let last = state.m1.len() - 1;
-    let [a, b] = half_widths;
+    let shape = rod.options().section;
     (0..=last)
         .map(|j| {
             let mut ends = [state.vertices[j], state.vertices[j + 1]];
             let middle = (ends[0] + ends[1]) * 0.5;
             let t = (ends[1] - ends[0]).normalize();
+            let [a, b] = rod.edge_half_widths_mm(j);
             if j == 0 {
                 ends[0] = middle;
             }
@@ -204,9 +206,12 @@ pub fn rod_jacobian(model: &Model, at: &Sensitivity, r: usize, j: usize) -> Opti
     out.rows_mut(0, 3).copy_from(&start);
     out.rows_mut(3, 3).copy_from(&end);
     out.rows_mut(6, 3).copy_from(line.m2.get(j)?);
-    let (q, by_a, by_b) = (rod.rod.parameters(), rod.dq_dp.row(15), rod.dq_dp.row(16));
+    let [a, b] = rod.rod.edge_half_widths_mm(j);
+    let u = rod.rod.taper_at_edge(j);
+    let by = |from: usize, to: usize| rod.dq_dp.row(from) * (1.0 - u) + rod.dq_dp.row(to) * u;
+    let (by_a, by_b) = (by(15, 17), by(16, 18));
     match rod.rod.options().section {
-        SectionShape::Ellipse if q.b > q.a => out.row_mut(9).copy_from(&(by_b - by_a)),
+        SectionShape::Ellipse if b > a => out.row_mut(9).copy_from(&(&by_b - &by_a)),
         SectionShape::Ellipse => {}
         SectionShape::Rectangle => out.row_mut(9).copy_from(&by_b),
     }
