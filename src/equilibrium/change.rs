@@ -43,7 +43,7 @@ pub struct EndFrameChange {
     pub axes: Matrix3<f64>,
 }
 
-/// Derivatives of a [`super::layout::LayoutDrive`].
+/// Derivatives of a `LayoutDrive`.
 #[derive(Clone, Copy, Debug)]
 pub struct DriveChange {
     /// Of the drive value of the rest pose, rad or mm.
@@ -52,7 +52,7 @@ pub struct DriveChange {
     pub reference: ReferenceChange,
 }
 
-/// Derivatives of a [`super::layout::LayoutTrace`].
+/// Derivatives of a [`super::LayoutTrace`].
 #[derive(Clone, Debug)]
 pub struct TraceChange {
     /// Of the position in the rest pose, mm.
