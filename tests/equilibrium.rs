@@ -120,10 +120,22 @@ fn states_by_parameters_against_differences() {
         cycle(&design, &layout, &q)
     };
     let mut worst = 0.0f64;
+    const SNAP: f64 = 0.2;
+    let energy = states.iter().map(|s| s.energy_n_mm).fold(0.0, f64::max);
+    let mut compared: Vec<bool> = Vec::new();
     // Where the torque passes zero, differences are only good against its size elsewhere.
     let torque = states.iter().map(|s| s.drive_load(&model, 0).abs()).fold(0.0, f64::max);
     for i in sampled(p.len()) {
         let shifted = [1.0, 2.0, 3.0].map(|k| [perturbed(i, k), perturbed(i, -k)]);
+        // Half a percent of a bound's width changes the energies little, unless a leaf snaps on the way.
+        let snaps = shifted.iter().flatten().any(|c| {
+            let pairs = c.states.iter().zip(&states);
+            pairs.map(|(a, b)| (a.energy_n_mm - b.energy_n_mm).abs()).fold(0.0, f64::max) > SNAP * energy
+        });
+        compared.push(!snaps);
+        if snaps {
+            continue;
+        }
         let difference = |value: &dyn Fn(&Cycle) -> f64| {
             let pairs = shifted.iter().zip(WEIGHTS);
             pairs.map(|([right, left], w)| w * (value(right) - value(left))).sum::<f64>() / (60.0 * step(i))
@@ -147,6 +159,8 @@ fn states_by_parameters_against_differences() {
         }
     }
     assert!(worst < 1e-6, "{worst}");
+    let count = compared.iter().filter(|c| **c).count();
+    assert!(count * 4 >= compared.len() * 3, "{count} of {} compared", compared.len());
 }
 
 /// Whether a design is one: its states do not depend on how finely the cycle is walked. Where they do, a leaf snaps, and
