@@ -6,7 +6,7 @@
 //! finished solids over the cycle are measured later.
 
 use super::anchor::{Anchor, Follow};
-use super::distance::separation;
+use super::distance::nearer_than;
 use super::gap::ROOT_MM;
 use super::link::{
     BAR_BELOW_MM, BOSS_BELOW_MM, Builder, ROUND_MM, Role, SAME_NODE_MM, SPREAD_MM, STUB_FREE_MM,
@@ -51,7 +51,7 @@ impl Builder<'_> {
         let (center, radius) = slot.bounding_sphere();
         near.into_iter().any(|n| {
             (n.center - center).norm() - n.radius - radius < gap_mm
-                && separation(&n.slot, slot).gap_mm < gap_mm
+                && nearer_than(&n.slot, slot, gap_mm)
         })
     }
 

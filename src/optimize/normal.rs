@@ -34,10 +34,7 @@ impl Normal {
                 continue;
             }
             self.gradient[j] += weight * residual * rj;
-            let w = weight * rj;
-            for (i, ri) in row.iter().enumerate().skip(j) {
-                self.gauss_newton[(i, j)] += w * ri;
-            }
+            self.add_column(j, weight * rj, row);
         }
     }
 
@@ -49,10 +46,16 @@ impl Normal {
                 continue;
             }
             self.gradient[j] += slope * rj;
-            let w = curvature * rj;
-            for (i, ri) in row.iter().enumerate().skip(j) {
-                self.gauss_newton[(i, j)] += w * ri;
-            }
+            self.add_column(j, curvature * rj, row);
+        }
+    }
+
+    /// Adds `factor` times the lower part of `row` to a column of the matrix.
+    fn add_column(&mut self, j: usize, factor: f64, row: &[f64]) {
+        let n = self.gradient.len();
+        let column = self.gauss_newton.as_mut_slice().get_mut(j * n + j..(j + 1) * n).unwrap_or_default();
+        for (to, r) in column.iter_mut().zip(&row[j..]) {
+            *to += factor * r;
         }
     }
 
