@@ -4,7 +4,7 @@
 mod common;
 
 use flexura::elaborate::{Elaborated, Options, elaborate};
-use flexura::geometry::joined::{Share, unite};
+use flexura::geometry::joined::{Share, join};
 use flexura::geometry::{BodySolid, Bore, Eye, Facets, Mesh, PartsInput, Probe, build_parts, check_mesh};
 use flexura::ir::{Assembly, Design, Placement, Quantity, Realization};
 use flexura::pipeline::{
@@ -354,8 +354,9 @@ fn a_mirrored_half_with_a_ground_in_common_is_printed_as_one_part() {
     let (half, _) = compiler.mesh(&a.designs[0], &starts[0]).unwrap();
     let half = check_mesh(&meshes(&half)[0].1);
     assert!(facts.volume_mm3 < 2.0 * half.volume_mm3 && facts.volume_mm3 > 1.8 * half.volume_mm3);
-    // The same bytes again.
+    // The same bytes again, and a solid to others too.
     assert_eq!(compiler.parts(&a, &starts).unwrap().0, artefacts);
+    common::accepted_by_others(&artefacts);
     // Apart they are two parts of one common body, and that is told.
     let far = assembly(&text.replace("at (0 mm, 0 mm)", "at (30 mm, 0 mm)"));
     let (artefacts, found) = compiler.parts(&far, &starts).unwrap();
@@ -394,6 +395,29 @@ fn merged_grounds_are_one_part() {
     let parts = meshes(&artefacts);
     assert_eq!(parts.iter().map(|p| p.0.as_str()).collect::<Vec<_>>(), ["twins_board.stl"]);
     assert!(check_mesh(&parts[0].1).is_printable());
+    common::accepted_by_others(&artefacts);
+}
+
+/// Four levers round one boss: it is there once, and the bars that leave it have their faces in one plane.
+#[test]
+fn merged_grounds_that_coincide_are_one_sound_part() {
+    let head = TWINS.split_once("mechanism twins").unwrap().0;
+    let text = format!(
+        "{head}mechanism star {{\n ground board {{ }}\n \
+         place one = lever at (0 mm, 0 mm) merging base into board\n \
+         place two = lever at (-20 mm, 20 mm) turned 90 deg about z merging base into board\n \
+         place three = lever at (-40 mm, 0 mm) turned 180 deg about z merging base into board\n \
+         place four = lever at (-20 mm, -20 mm) turned 270 deg about z merging base into board\n export stl\n}}\n"
+    );
+    let a = assembly(&text);
+    assert_eq!((a.joined.len(), a.instances.len()), (1, 4));
+    let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
+    let (artefacts, found) = Compiler::default().parts(&a, &starts).unwrap();
+    assert_eq!(found, []);
+    let [(name, mesh)] = meshes(&artefacts).try_into().unwrap();
+    let facts = check_mesh(&mesh);
+    assert!(name == "star_board.stl" && facts.is_printable(), "{name}: {facts:?}");
+    common::accepted_by_others(&artefacts);
 }
 
 /// Where a merged ground of another instance runs through a bore, the bore is cut again.
@@ -416,7 +440,7 @@ fn a_bore_stays_open_in_a_merged_body() {
             axis: Some(v(0.0, 0.0, 1.0)),
             ..BodySolid::default()
         };
-        build_parts(&PartsInput {
+        let input = PartsInput {
             motion: Vec::new(),
             height_mm: 8.0,
             clearance_mm: 0.3,
@@ -424,19 +448,23 @@ fn a_bore_stays_open_in_a_merged_body() {
             bodies: vec![body],
             flexures: Vec::new(),
             facets: Facets::default(),
-        })
-        .unwrap()
+        };
+        let parts = build_parts(&input).unwrap();
+        (input, parts)
     };
     let bored = bar([v(0.0, 0.0, 0.0), v(30.0, 0.0, 0.0)], true);
     let plain = bar([v(0.0, -20.0, 0.0), v(0.0, 20.0, 0.0)], false);
     let place = |x: f64| Placement::new(&nalgebra::Matrix3::identity(), &v(x, 0.0, 0.0));
     let united = |x: f64| {
-        let shares = [(&bored, 0.0), (&plain, x)].map(|(p, x)| Share {
-            mesh: &p.parts[0].mesh,
+        let shares = [(&bored, 0.0), (&plain, x)].map(|((input, p), x)| Share {
+            input,
+            plans: &p.plans,
+            carving: &p.carving,
+            states: Vec::new(),
             placement: place(x),
-            common: p.plans.iter().collect(),
+            bodies: vec![0],
         });
-        unite(&shares, &Facets::default()).unwrap()
+        join(&shares).unwrap().build(&[0]).unwrap()
     };
     for x in [0.5, 12.0] {
         let solids = united(x);
@@ -503,6 +531,7 @@ fn halves_with_a_moving_body_in_common_are_printed_as_one_part() {
     let facts = check_mesh(&parts[0].1);
     assert!(facts.is_printable(), "{facts:?}");
     assert!((facts.least.x + facts.largest.x).abs() < 1e-4);
+    common::accepted_by_others(&artefacts);
     // The shaft still passes the eyes of both halves (above the slot between them): 5 mm and the process's room.
     let probe = Probe::new(&parts[0].1);
     let width = probe.hollow_mm(&Vector3::new(0.0, 0.0, -9.3), &Vector3::new(1.0, 0.2, 0.0)).unwrap();

@@ -258,7 +258,8 @@ pub fn groups(input: &PartsInput) -> Vec<Vec<usize>> {
         .collect()
 }
 
-fn build_part(
+/// One solid of some bodies and the flexures between them.
+pub(super) fn build_part(
     input: &PartsInput,
     plans: &[BodyPlan],
     carving: &Carving,
