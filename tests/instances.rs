@@ -8,7 +8,7 @@ use flexura::geometry::joined::{Share, join};
 use flexura::geometry::{BodySolid, Bore, Eye, Facets, Mesh, PartsInput, Probe, build_parts, check_mesh};
 use flexura::ir::{Assembly, Design, Placement, Quantity, Realization};
 use flexura::pipeline::{
-    self, Artefact, BuildOutcome, Checked, Compiler, Failed, Files, Iteration, Progress,
+    self, Artefact, Between, BuildOutcome, Checked, Compiler, Failed, Files, Iteration, Progress,
 };
 use flexura::pipeline::{Request, Show, Simulation, Solved, Stages};
 use nalgebra::Vector3;
@@ -60,6 +60,9 @@ impl Stages for Counted {
     fn simulate(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
         self.simulated.set(self.simulated.get() + 1);
         self.compiler.simulate(design, values)
+    }
+    fn between(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Between {
+        self.compiler.between(assembly, values)
     }
     fn optimize(
         &self,
@@ -368,6 +371,66 @@ fn a_mirrored_half_with_a_ground_in_common_is_printed_as_one_part() {
         assert!(facts.is_printable(), "{name} {facts:?}");
         assert!((facts.volume_mm3 - half.volume_mm3).abs() < 1e-3 * half.volume_mm3);
     }
+}
+
+/// The gap between two images is twice that of one of them to the mirror: of the disc round its tip, which goes with the
+/// traced point.
+#[test]
+fn the_gap_between_instances_is_measured_in_every_state() {
+    // The arm stands beside the plane and swings to it.
+    let head = TWINS.split_once("mechanism twins").unwrap().0;
+    let pair = |x: f64| {
+        format!(
+            "{head}mechanism pair {{\n place right = lever at ({x} mm, 0 mm) turned 90 deg about z\n \
+             mirror left = right across yz\n require min(gap(right)) >= 0.3 mm\n \
+             require min(gap()) >= 0.3 mm\n}}\n"
+        )
+    };
+    let text = pair(12.0);
+    let a = assembly(&text);
+    let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
+    let between = Compiler::default().between(&a, &starts);
+    assert_eq!(between.diagnostics, []);
+    let tips: Vec<f64> =
+        simulated(&text, 4, false).motion.states.iter().map(|s| s.traces_mm[0][0].abs()).collect();
+    assert_eq!((between.gaps_mm.len(), tips.len()), (5, 5));
+    // In the last state the tip alone is nearest.
+    let radius = tips[4] - between.gaps_mm[4] / 2.0;
+    assert!((2.5..4.0).contains(&radius), "{radius}");
+    assert!(tips[4] < tips[0] - 5.0, "{tips:?}");
+    for (gap, tip) in between.gaps_mm.iter().zip(&tips).skip(1) {
+        assert!((gap - 2.0 * (tip - radius)).abs() < 1e-6, "{gap} {tip} {radius}");
+    }
+    // Nearer they collide on the way, which neither of them can know, and nothing is in the way at rest.
+    let stages =
+        Counted { compiler: Compiler { iterations: 0, ..Compiler::default() }, ..Counted::default() };
+    let out = build(&pair(8.0), &stages, None);
+    let codes: Vec<&str> = out.diagnostics.iter().map(|d| d.code.as_str()).collect();
+    assert!(codes.contains(&"W0635") && codes.contains(&"E0801") && !codes.contains(&"E0641"), "{codes:?}");
+    let gaps: Vec<(bool, bool)> = out
+        .requirements
+        .iter()
+        .filter(|r| r.text.contains("gap"))
+        .map(|r| (r.pass, r.value.unwrap() < 0.0))
+        .collect();
+    assert_eq!(gaps, [(true, false), (false, true)]);
+    assert_eq!(out.after.unwrap().gap.least_mm, out.requirements.last().unwrap().value);
+}
+
+/// What one half's leaves sweep is measured against what the other half has of the body in common.
+#[test]
+fn a_flexure_is_kept_clear_of_the_other_halfs_share() {
+    let least = |text: &str| {
+        let a = assembly(text);
+        let starts: Vec<Vec<f64>> =
+            a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
+        let between = Compiler::default().between(&a, &starts);
+        (between.gaps_mm.into_iter().fold(f64::INFINITY, f64::min), between.diagnostics.len())
+    };
+    let wide = least(&CAR.replace("R = (14 mm, 24 mm)", "R = (20 mm, 24 mm)"));
+    assert!(wide.0 > 0.3 && wide.1 == 0, "{wide:?}");
+    let narrow = least(CAR);
+    assert!(narrow.0 < wide.0, "{narrow:?} {wide:?}");
 }
 
 #[test]

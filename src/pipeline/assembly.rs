@@ -237,7 +237,11 @@ pub fn check_all(
         return out;
     }
     let closed = assembly.designs.iter().all(is_closed);
-    let whole = combine(assembly, placed.to_vec(), between);
+    let mut whole = combine(assembly, placed.to_vec(), between);
+    if assembly.instances.len() > 1 && between.gaps_mm.is_empty() {
+        // The gap of the whole is not that of its instances.
+        whole.gaps_mm.clear();
+    }
     for r in &assembly.requirements {
         let of = r.instance.and_then(|i| placed.get(i)).unwrap_or(&whole);
         out.push(check_requirement(&r.requirement, closed, of, found));
