@@ -12,7 +12,7 @@ use super::settings::Settings;
 use super::sheet::Sheet;
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::ir::assembly::{AssemblyExport, AssemblyRequirement, InstanceDrive, Joined, PlacedDrive};
-use crate::ir::{Assembly, Design, Export, ExportKind, Instance, JointKind, Placement, Quantity};
+use crate::ir::{Assembly, Design, Export, ExportKind, Instance, JointKind, Placement};
 use crate::syntax::ast::{self, Expr, Ident, Item, Mechanism, StatementKind};
 use std::collections::{BTreeMap, BTreeSet};
 

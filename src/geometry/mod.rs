@@ -55,7 +55,7 @@ pub use input::{flexure_solid, parts_input};
 pub use mesh::Mesh;
 pub use parts::{
     BodySolid, Bore, Eye, FlexureSolid, GeometryError, Guide, Part, Parts, PartsInput, build_carved_parts,
-    build_parts, plan_bodies,
+    build_parts, build_wanted_parts, plan_bodies,
 };
 pub use ray::Probe;
 pub use slot::{Facets, Slot};

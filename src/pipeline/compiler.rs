@@ -210,7 +210,7 @@ impl Stages for Compiler {
     ) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
         let mut found = Vec::new();
         let mut built = Vec::new();
-        for (design, values) in assembly.designs.iter().zip(values) {
+        for (d, (design, values)) in assembly.designs.iter().zip(values).enumerate() {
             solids::available(design)?;
             let (layout, _) = layout(design, values)?;
             let model =
@@ -219,7 +219,9 @@ impl Stages for Compiler {
             let solved = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
             let cycle = sweep(&solved).map_err(|e| lost(design, &e))?;
             let states = solids::states(design, &layout, &solved, &cycle);
-            let (parts, findings) = solids::build(design, &layout, &model, &states)?;
+            let (parts, findings) = solids::build(design, &layout, &model, &states, &|bodies| {
+                joined::stands_alone(assembly, d, bodies)
+            })?;
             found.extend(findings);
             built.push(Solid { input: parts_input(design, &layout, &model), parts, states });
         }

@@ -136,6 +136,16 @@ fn joint_body(assembly: &Assembly, instance: usize, body: usize) -> Option<usize
     assembly.joined.iter().position(|j| j.members.contains(&(instance, body)))
 }
 
+/// Whether a part of a design is printed by itself in an instance: none of its bodies belongs to another one too.
+pub fn stands_alone(assembly: &Assembly, design: usize, bodies: &[usize]) -> bool {
+    let common = |i: usize, b: usize| {
+        joint_body(assembly, i, b).and_then(|j| assembly.joined.get(j)).is_some_and(|j| j.members.len() > 1)
+    };
+    let of_design = |(_, n): &(usize, &Instance)| n.design == design;
+    let mut instances = assembly.instances.iter().enumerate().filter(of_design);
+    instances.any(|(i, _)| bodies.iter().all(|b| !common(i, *b)))
+}
+
 /// A part that no other instance has a body of, in its place.
 fn alone(assembly: &Assembly, solids: &[Solid], whole: &Whole, group: &[usize]) -> Option<Mesh> {
     let members: Vec<&(usize, usize)> = group.iter().filter_map(|b| whole.bodies.get(*b)).flatten().collect();

@@ -5,13 +5,13 @@ use super::stages::Failed;
 use crate::diagnostic::Diagnostic;
 use crate::equilibrium::{Cycle, Layout, Model};
 use crate::geometry::{
-    Carving, Cut, CycleGaps, Fusion, GeometryError, LeastGap, Member, MovedState, Parts, build_carved_parts,
+    Carving, Cut, CycleGaps, Fusion, GeometryError, LeastGap, Member, MovedState, Parts, build_wanted_parts,
     carve, carved_cycle_gaps, flexure_solid, parts_input, plan_bodies,
 };
 use crate::ir::{Design, ExportKind, Joint, JointKind};
 
 /// Builds the printed parts of a design in its rest pose; links make way for their own flexures in the `states` of the
-/// cycle.
+/// cycle. Meshed is only what is `wanted`, by the bodies of a part.
 ///
 /// # Errors
 /// Where no solid comes out.
@@ -20,9 +20,10 @@ pub fn build(
     layout: &Layout,
     model: &Model,
     states: &[MovedState],
+    wanted: &(dyn Fn(&[usize]) -> bool + Sync),
 ) -> Result<(Parts, Vec<Diagnostic>), Failed> {
     let input = parts_input(design, layout, model);
-    let parts = build_carved_parts(&input, states).map_err(|e| no_solid(design, &e))?;
+    let parts = build_wanted_parts(&input, states, wanted).map_err(|e| no_solid(design, &e))?;
     let found = parts.fusions.iter().map(|f| fusion(design, f)).collect();
     Ok((parts, found))
 }
