@@ -4,11 +4,15 @@
 mod common;
 
 use flexura::elaborate::{Elaborated, Options, elaborate};
-use flexura::geometry::joined::{Share, unite};
-use flexura::geometry::{BodySolid, Bore, Eye, Facets, Mesh, PartsInput, Probe, build_parts, check_mesh};
+use flexura::equilibrium::{Layout, Model};
+use flexura::geometry::joined::{Share, join};
+use flexura::geometry::{
+    BodySolid, Bore, Eye, Facets, Mesh, PartsInput, Probe, build_parts, check_mesh, parts_input,
+};
 use flexura::ir::{Assembly, Design, Placement, Quantity, Realization};
+use flexura::kinematics::solve_motion;
 use flexura::pipeline::{
-    self, Artefact, BuildOutcome, Checked, Compiler, Failed, Files, Iteration, Progress,
+    self, Artefact, Between, BuildOutcome, Checked, Compiler, Failed, Files, Iteration, Progress,
 };
 use flexura::pipeline::{Request, Show, Simulation, Solved, Stages};
 use nalgebra::Vector3;
@@ -60,6 +64,9 @@ impl Stages for Counted {
     fn simulate(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
         self.simulated.set(self.simulated.get() + 1);
         self.compiler.simulate(design, values)
+    }
+    fn between(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Between {
+        self.compiler.between(assembly, values)
     }
     fn optimize(
         &self,
@@ -354,8 +361,9 @@ fn a_mirrored_half_with_a_ground_in_common_is_printed_as_one_part() {
     let (half, _) = compiler.mesh(&a.designs[0], &starts[0]).unwrap();
     let half = check_mesh(&meshes(&half)[0].1);
     assert!(facts.volume_mm3 < 2.0 * half.volume_mm3 && facts.volume_mm3 > 1.8 * half.volume_mm3);
-    // The same bytes again.
+    // The same bytes again, and a solid to others too.
     assert_eq!(compiler.parts(&a, &starts).unwrap().0, artefacts);
+    common::accepted_by_others(&artefacts);
     // Apart they are two parts of one common body, and that is told.
     let far = assembly(&text.replace("at (0 mm, 0 mm)", "at (30 mm, 0 mm)"));
     let (artefacts, found) = compiler.parts(&far, &starts).unwrap();
@@ -366,6 +374,108 @@ fn a_mirrored_half_with_a_ground_in_common_is_printed_as_one_part() {
         let facts = check_mesh(mesh);
         assert!(facts.is_printable(), "{name} {facts:?}");
         assert!((facts.volume_mm3 - half.volume_mm3).abs() < 1e-3 * half.volume_mm3);
+    }
+}
+
+/// The gap between two images is twice that of one of them to the mirror: of the disc round its tip, which goes with the
+/// traced point.
+#[test]
+fn the_gap_between_instances_is_measured_in_every_state() {
+    /// The disc is measured on its facets, which stand back from a circle of 4.6 mm by up to 0.006 mm, on both sides.
+    const FACETS_MM: f64 = 0.015;
+    // The arm stands beside the plane and swings to it.
+    let head = TWINS.split_once("mechanism twins").unwrap().0;
+    let pair = |x: f64| {
+        format!(
+            "{head}mechanism pair {{\n place right = lever at ({x} mm, 0 mm) turned 90 deg about z\n \
+             mirror left = right across yz\n require min(gap(right)) >= 0.3 mm\n \
+             require min(gap()) >= 0.3 mm\n}}\n"
+        )
+    };
+    let text = pair(12.0);
+    let a = assembly(&text);
+    let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
+    let between = Compiler::default().between(&a, &starts);
+    assert_eq!(between.diagnostics, []);
+    let tips: Vec<f64> =
+        simulated(&text, 4, false).motion.states.iter().map(|s| s.traces_mm[0][0].abs()).collect();
+    assert_eq!((between.gaps_mm.len(), tips.len()), (5, 5));
+    // The disc ends the half as it was drawn, with the arm along x.
+    let (half, _) = Compiler::default().mesh(&a.designs[0], &starts[0]).unwrap();
+    let radius = check_mesh(&meshes(&half)[0].1).largest.x - 40.0;
+    assert!(tips[4] < tips[0] - 5.0, "{tips:?}");
+    // Before, the stubs of the leaves are nearer.
+    for (gap, tip) in between.gaps_mm.iter().zip(&tips).skip(2) {
+        assert!((gap - 2.0 * (tip - radius)).abs() < FACETS_MM, "{gap} {tip} {radius}");
+    }
+    // Nearer they collide on the way, which neither of them can know, and nothing is in the way at rest.
+    let stages =
+        Counted { compiler: Compiler { iterations: 0, ..Compiler::default() }, ..Counted::default() };
+    let out = build(&pair(8.0), &stages, None);
+    let codes: Vec<&str> = out.diagnostics.iter().map(|d| d.code.as_str()).collect();
+    assert!(codes.contains(&"W0635") && codes.contains(&"E0801") && !codes.contains(&"E0641"), "{codes:?}");
+    let gaps: Vec<(bool, bool)> = out
+        .requirements
+        .iter()
+        .filter(|r| r.text.contains("gap"))
+        .map(|r| (r.pass, r.value.unwrap() < 0.0))
+        .collect();
+    assert_eq!(gaps, [(true, false), (false, true)]);
+    assert_eq!(out.after.unwrap().gap.least_mm, out.requirements.last().unwrap().value);
+}
+
+/// Another instance has a block of the common body where a leaf of the first one is: it makes way as a link of the leaf's own
+/// instance does.
+#[test]
+fn a_common_body_makes_way_for_the_flexures_of_each_instance() {
+    let a = assembly(TWINS);
+    let design = &a.designs[0];
+    let p: Vec<f64> = design.free.iter().map(|f| f.start).collect();
+    let layout = Layout::new(design, &solve_motion(design, &p).unwrap(), &p);
+    let model = Model::new(design, &layout, &p, 48, false).unwrap();
+    let input = parts_input(design, &layout, &model);
+    let alone = build_parts(&input).unwrap();
+    assert!(input.flexures[0].bodies.0 == 0 && !alone.carving.made(0, 0));
+    let (leaf, k) = (&input.flexures[0], 24);
+    let (middle, across) = (leaf.centreline[k], leaf.m1[k]);
+    // Its boss is 7.4 mm wide: the middle of the leaf lies in it.
+    let block = PartsInput {
+        motion: Vec::new(),
+        height_mm: 20.0,
+        flexures: Vec::new(),
+        bodies: vec![BodySolid {
+            name: "base".into(),
+            skeleton: vec![middle + across * (6.4 * across.y.signum()), Vector3::new(-20.0, 0.0, 0.0)],
+            axis: Some(Vector3::z()),
+            ..BodySolid::default()
+        }],
+        ..input.clone()
+    };
+    let block_parts = build_parts(&block).unwrap();
+    let whole = join(&[(&input, &alone, vec![0, 1]), (&block, &block_parts, vec![0])].map(
+        |(input, parts, bodies)| Share {
+            input,
+            plans: &parts.plans,
+            carving: &parts.carving,
+            states: Vec::new(),
+            placement: Placement::IDENTITY,
+            bodies,
+        },
+    ))
+    .unwrap();
+    let cut = whole.carving.cuts.iter().find(|c| (c.body, c.flexure) == (0, 0)).unwrap();
+    assert!(cut.depth_mm > 0.5 && cut.made, "{cut:?}");
+    let solids = whole.build(&[0, 1]).unwrap();
+    assert_eq!(solids.len(), 1);
+    assert!(check_mesh(&solids[0]).is_printable());
+    let probe = Probe::new(&solids[0]);
+    for k in [20, 24, 28] {
+        // Off the axis of symmetry by a hair, so that no ray runs along an edge of the mesh.
+        let at = leaf.centreline[k] + leaf.m2[k] * 1e-3;
+        let thickness = probe.thickness_mm(&at, &leaf.m1[k]).unwrap();
+        assert!((thickness / (2.0 * leaf.a_mm[k]) - 1.0).abs() < 5e-3, "{k}: {thickness}");
+        let beside = at + across * (leaf.a_mm[k] + 0.1);
+        assert!(probe.hollow_mm(&beside, &across).is_none_or(|w| w >= input.clearance_mm), "{k}");
     }
 }
 
@@ -394,6 +504,29 @@ fn merged_grounds_are_one_part() {
     let parts = meshes(&artefacts);
     assert_eq!(parts.iter().map(|p| p.0.as_str()).collect::<Vec<_>>(), ["twins_board.stl"]);
     assert!(check_mesh(&parts[0].1).is_printable());
+    common::accepted_by_others(&artefacts);
+}
+
+/// Four levers round one boss: it is there once, and the bars that leave it have their faces in one plane.
+#[test]
+fn merged_grounds_that_coincide_are_one_sound_part() {
+    let head = TWINS.split_once("mechanism twins").unwrap().0;
+    let text = format!(
+        "{head}mechanism star {{\n ground board {{ }}\n \
+         place one = lever at (0 mm, 0 mm) merging base into board\n \
+         place two = lever at (-20 mm, 20 mm) turned 90 deg about z merging base into board\n \
+         place three = lever at (-40 mm, 0 mm) turned 180 deg about z merging base into board\n \
+         place four = lever at (-20 mm, -20 mm) turned 270 deg about z merging base into board\n export stl\n}}\n"
+    );
+    let a = assembly(&text);
+    assert_eq!((a.joined.len(), a.instances.len()), (1, 4));
+    let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
+    let (artefacts, found) = Compiler::default().parts(&a, &starts).unwrap();
+    assert_eq!(found, []);
+    let [(name, mesh)] = meshes(&artefacts).try_into().unwrap();
+    let facts = check_mesh(&mesh);
+    assert!(name == "star_board.stl" && facts.is_printable(), "{name}: {facts:?}");
+    common::accepted_by_others(&artefacts);
 }
 
 /// Where a merged ground of another instance runs through a bore, the bore is cut again.
@@ -416,7 +549,7 @@ fn a_bore_stays_open_in_a_merged_body() {
             axis: Some(v(0.0, 0.0, 1.0)),
             ..BodySolid::default()
         };
-        build_parts(&PartsInput {
+        let input = PartsInput {
             motion: Vec::new(),
             height_mm: 8.0,
             clearance_mm: 0.3,
@@ -424,19 +557,23 @@ fn a_bore_stays_open_in_a_merged_body() {
             bodies: vec![body],
             flexures: Vec::new(),
             facets: Facets::default(),
-        })
-        .unwrap()
+        };
+        let parts = build_parts(&input).unwrap();
+        (input, parts)
     };
     let bored = bar([v(0.0, 0.0, 0.0), v(30.0, 0.0, 0.0)], true);
     let plain = bar([v(0.0, -20.0, 0.0), v(0.0, 20.0, 0.0)], false);
     let place = |x: f64| Placement::new(&nalgebra::Matrix3::identity(), &v(x, 0.0, 0.0));
     let united = |x: f64| {
-        let shares = [(&bored, 0.0), (&plain, x)].map(|(p, x)| Share {
-            mesh: &p.parts[0].mesh,
+        let shares = [(&bored, 0.0), (&plain, x)].map(|((input, p), x)| Share {
+            input,
+            plans: &p.plans,
+            carving: &p.carving,
+            states: Vec::new(),
             placement: place(x),
-            common: p.plans.iter().collect(),
+            bodies: vec![0],
         });
-        unite(&shares, &Facets::default()).unwrap()
+        join(&shares).unwrap().build(&[0]).unwrap()
     };
     for x in [0.5, 12.0] {
         let solids = united(x);
@@ -503,6 +640,7 @@ fn halves_with_a_moving_body_in_common_are_printed_as_one_part() {
     let facts = check_mesh(&parts[0].1);
     assert!(facts.is_printable(), "{facts:?}");
     assert!((facts.least.x + facts.largest.x).abs() < 1e-4);
+    common::accepted_by_others(&artefacts);
     // The shaft still passes the eyes of both halves (above the slot between them): 5 mm and the process's room.
     let probe = Probe::new(&parts[0].1);
     let width = probe.hollow_mm(&Vector3::new(0.0, 0.0, -9.3), &Vector3::new(1.0, 0.2, 0.0)).unwrap();

@@ -12,7 +12,7 @@ use super::settings::Settings;
 use super::sheet::Sheet;
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::ir::assembly::{AssemblyExport, AssemblyRequirement, InstanceDrive, Joined, PlacedDrive};
-use crate::ir::{Assembly, Design, Export, ExportKind, Instance, JointKind, Placement, Quantity};
+use crate::ir::{Assembly, Design, Export, ExportKind, Instance, JointKind, Placement};
 use crate::syntax::ast::{self, Expr, Ident, Item, Mechanism, StatementKind};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -461,17 +461,7 @@ impl<'a> Evaluator<'a> {
         let line = quote(outside.sources, query.at);
         let inner = self.scope_inside(scope);
         let requirement = self.requirement(inner, &text, &traces, &drives, &line)?;
-        match (instance, &requirement.quantity) {
-            (None, Quantity::Gap) => self.fail(
-                Diagnostic::error(
-                    codes::LATER_TERM,
-                    "the gap between instances is not available yet",
-                    query.at,
-                )
-                .help("gaps are measured within an instance: write `gap(INSTANCE)`"),
-            ),
-            _ => Ok(AssemblyRequirement { instance, requirement }),
-        }
+        Ok(AssemblyRequirement { instance, requirement })
     }
 
     fn instance_export(

@@ -80,15 +80,24 @@ pub fn carve(
     plans: &[BodyPlan],
     states: &[MovedState],
 ) -> Result<Carving, GeometryError> {
-    let done: Vec<(Vec<Cut>, Option<Mesh>)> = plans
+    carve_bodies(input, plans, states, &(0..plans.len()).collect::<Vec<_>>())
+}
+
+/// The same for some of the links.
+pub(super) fn carve_bodies(
+    input: &PartsInput,
+    plans: &[BodyPlan],
+    states: &[MovedState],
+    bodies: &[usize],
+) -> Result<Carving, GeometryError> {
+    let done: Vec<(Vec<Cut>, Option<Mesh>)> = bodies
         .par_iter()
-        .enumerate()
-        .map(|(body, plan)| carve_body(input, body, plan, states))
+        .map(|body| carve_body(input, *body, &plans[*body], states))
         .collect::<Result<_, _>>()?;
     let mut carving = Carving::default();
-    for (body, (cuts, link)) in done.into_iter().enumerate() {
+    for (body, (cuts, link)) in bodies.iter().zip(done) {
         carving.cuts.extend(cuts);
-        carving.links.extend(link.map(|mesh| (body, mesh)));
+        carving.links.extend(link.map(|mesh| (*body, mesh)));
     }
     Ok(carving)
 }

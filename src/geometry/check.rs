@@ -1,13 +1,14 @@
 //! An independent look at a finished mesh: closed, oriented, in how many pieces, crossing itself or
 //! not. Nothing here knows how the mesh was made.
+//!
+//! Readers of STL take vertices for one that are nearly equal, and programs with exact arithmetic take a crossing for a
+//! crossing however small. So vertices are looked at on a lattice of 1e-6 mm, those on one lattice point are one, and
+//! from there on there is no tolerance.
 
+use super::exact::{Point, is_flat, on_lattice, triangles_meet};
 use super::mesh::Mesh;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
-
-/// Two triangles cross only if corners lie farther than this on both sides of the other's plane, mm.
-/// Rounding to `f32` moves a vertex by up to 4e-6 mm at 60 mm, 8e-6 mm beyond 64 mm.
-pub const TOUCH_MM: f64 = 2e-5;
 
 /// What a mesh is like.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,8 +19,12 @@ pub struct MeshFacts {
     pub oriented: bool,
     /// Pieces not connected through edges.
     pub components: usize,
-    /// Pairs of triangles that cross each other by more than [`TOUCH_MM`].
+    /// Pairs of triangles that have more in common than their corners and edges.
     pub self_intersections: usize,
+    /// Triangles without an area: corners on one line, or nearer to each other than the lattice is wide.
+    pub flat: usize,
+    /// Vertices in which surfaces touch that are not neighbours there.
+    pub pinched: usize,
     /// The first few of those pairs.
     pub examples: Vec<(usize, usize)>,
     /// Enclosed volume, mm³.
@@ -35,36 +40,91 @@ pub struct MeshFacts {
 }
 
 impl MeshFacts {
-    /// Closed, oriented, in one piece, not crossing itself, and not inside out.
+    /// Closed, oriented, in one piece, a manifold that does not cross itself, and not inside out.
     pub fn is_printable(&self) -> bool {
+        self.is_sound() && self.components == 1
+    }
+
+    /// The same in any number of pieces.
+    pub fn is_sound(&self) -> bool {
         self.closed
             && self.oriented
-            && self.components == 1
             && self.self_intersections == 0
+            && self.flat == 0
+            && self.pinched == 0
             && self.volume_mm3 > 0.0
+    }
+}
+
+/// A mesh with its vertices on the lattice, those on one point merged.
+struct OnLattice {
+    points: Vec<Point>,
+    triangles: Vec<[usize; 3]>,
+}
+
+impl OnLattice {
+    fn new(mesh: &Mesh) -> Self {
+        let mut ids: BTreeMap<Point, usize> = BTreeMap::new();
+        let mut points = Vec::new();
+        let place: Vec<usize> = mesh
+            .vertices
+            .iter()
+            .map(|p| {
+                let q = on_lattice(p);
+                *ids.entry(q).or_insert_with(|| {
+                    points.push(q);
+                    points.len() - 1
+                })
+            })
+            .collect();
+        // A vertex that does not exist stays one that does not.
+        let there = |i: usize| place.get(i).copied().unwrap_or(usize::MAX);
+        let triangles = mesh.triangles.iter().map(|t| t.map(there)).collect();
+        Self { points, triangles }
+    }
+
+    fn corners(&self, t: usize) -> [Point; 3] {
+        self.triangles[t].map(|i| self.points.get(i).copied().unwrap_or_default())
+    }
+
+    /// A triangle without an area.
+    fn is_flat(&self, t: usize) -> bool {
+        let [a, b, c] = self.triangles[t];
+        a == b || b == c || c == a || is_flat(&self.corners(t))
     }
 }
 
 /// Checks a mesh.
 pub fn check_mesh(mesh: &Mesh) -> MeshFacts {
+    let on = OnLattice::new(mesh);
     // Edge → triangles that run through it upwards, downwards (by vertex index).
     let mut edges: BTreeMap<(usize, usize), (usize, usize)> = BTreeMap::new();
-    let mut piece = Pieces::new(mesh.triangles.len());
-    let mut first_at: BTreeMap<(usize, usize), usize> = BTreeMap::new();
-    let mut sound = !mesh.triangles.is_empty();
-    for (t, ids) in mesh.triangles.iter().enumerate() {
+    let mut piece = Pieces::new(on.triangles.len());
+    // Corners 3 t + k: neighbours over an edge are joined at both its ends.
+    let mut fans = Pieces::new(3 * on.triangles.len());
+    let mut first_at: BTreeMap<(usize, usize), (usize, [usize; 2])> = BTreeMap::new();
+    let mut used = vec![false; on.points.len()];
+    let mut sound = !on.triangles.is_empty() && mesh.vertices.iter().all(|p| p.iter().all(|x| x.is_finite()));
+    for (t, ids) in on.triangles.iter().enumerate() {
         for k in 0..3 {
             let (i, j) = (ids[k], ids[(k + 1) % 3]);
-            sound &= i != j && i < mesh.vertices.len() && j < mesh.vertices.len();
+            sound &= i != j && i < on.points.len() && j < on.points.len();
+            if let Some(u) = used.get_mut(i) {
+                *u = true;
+            }
             let key = (i.min(j), i.max(j));
+            let mut ends = [3 * t + k, 3 * t + (k + 1) % 3];
             let count = edges.entry(key).or_default();
             if i < j {
                 count.0 += 1;
             } else {
                 count.1 += 1;
+                ends.swap(0, 1);
             }
-            let first = *first_at.entry(key).or_insert(t);
+            let (first, at) = *first_at.entry(key).or_insert((t, ends));
             piece.join(first, t);
+            fans.join(at[0], ends[0]);
+            fans.join(at[1], ends[1]);
         }
     }
     let closed = sound && edges.values().all(|(up, down)| up + down == 2);
@@ -76,6 +136,8 @@ pub fn check_mesh(mesh: &Mesh) -> MeshFacts {
         oriented,
         components: piece.count(),
         self_intersections: crossing.len(),
+        flat: (0..on.triangles.len()).filter(|t| on.is_flat(*t)).count(),
+        pinched: fans.count().saturating_sub(used.iter().filter(|u| **u).count()),
         examples: crossing.into_iter().take(10).collect(),
         volume_mm3: mesh.volume_mm3(),
         area_mm2: mesh.area_mm2(),
@@ -85,7 +147,7 @@ pub fn check_mesh(mesh: &Mesh) -> MeshFacts {
     }
 }
 
-/// Union–find over triangles.
+/// Union–find.
 struct Pieces(Vec<usize>);
 
 impl Pieces {
@@ -111,20 +173,29 @@ impl Pieces {
     }
 }
 
-/// Pairs of triangles that cross, sorted. Broad phase: boxes in a sweep over a median-split tree.
+/// Pairs of triangles that have more in common than their corners and edges, sorted; those without an area apart.
+/// Broad phase: boxes in a sweep over a median-split tree.
 pub fn crossing_pairs(mesh: &Mesh) -> Vec<(usize, usize)> {
-    let corners: Vec<[Vector3<f64>; 3]> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
-    let boxes: Vec<(Vector3<f64>, Vector3<f64>)> =
-        corners.iter().map(|[a, b, c]| (a.inf(b).inf(c), a.sup(b).sup(c))).collect();
-    let mut ids: Vec<usize> = (0..corners.len()).collect();
+    let on = OnLattice::new(mesh);
+    let corners: Vec<[Point; 3]> = (0..on.triangles.len()).map(|t| on.corners(t)).collect();
+    // Whole numbers below 2^53: exact in floats.
+    let boxes: Vec<(Vector3<f64>, Vector3<f64>)> = corners
+        .iter()
+        .map(|t| {
+            let [a, b, c] = t.map(|p| Vector3::from(p.map(|x| x as f64)));
+            (a.inf(&b).inf(&c), a.sup(&b).sup(&c))
+        })
+        .collect();
+    let mut ids: Vec<usize> = (0..corners.len()).filter(|t| !on.is_flat(*t)).collect();
+    let solid = ids.clone();
     let tree = Tree::build(&mut ids, &boxes);
     let mut found = Vec::new();
     let mut near = Vec::new();
-    for t in 0..corners.len() {
+    for t in solid {
         near.clear();
         tree.query(&boxes[t], &mut near, &boxes);
         for &u in near.iter().filter(|u| **u > t) {
-            if triangles_cross(&mesh.triangles[t], &corners[t], &mesh.triangles[u], &corners[u]) {
+            if triangles_meet(&on.triangles[t], &corners[t], &on.triangles[u], &corners[u]) {
                 found.push((t, u));
             }
         }
@@ -180,64 +251,4 @@ impl Tree {
             Content::Halves(halves) => halves.iter().for_each(|h| h.query(region, found, boxes)),
         }
     }
-}
-
-/// Whether two triangles cross each other, touching at shared corners and edges apart.
-fn triangles_cross(
-    s_ids: &[usize; 3],
-    s: &[Vector3<f64>; 3],
-    t_ids: &[usize; 3],
-    t: &[Vector3<f64>; 3],
-) -> bool {
-    let shared = s_ids.iter().filter(|i| t_ids.contains(i)).count();
-    if shared == 3 {
-        return true;
-    }
-    let (ds, dt) = (plane_distances(s, t), plane_distances(t, s));
-    let (Some(ds), Some(dt)) = (ds, dt) else {
-        // A needle has no plane; its neighbours show what is wrong with it.
-        return false;
-    };
-    if ds.iter().all(|d| d.abs() <= TOUCH_MM) && dt.iter().all(|d| d.abs() <= TOUCH_MM) {
-        return coplanar_overlap(s, t);
-    }
-    shared < 2 && (edge_pierces(s, &ds, t) || edge_pierces(t, &dt, s))
-}
-
-/// Signed distances of `s`'s corners from the plane of `t`.
-fn plane_distances(s: &[Vector3<f64>; 3], t: &[Vector3<f64>; 3]) -> Option<[f64; 3]> {
-    let n = (t[1] - t[0]).cross(&(t[2] - t[0])).try_normalize(1e-12)?;
-    Some(s.map(|p| n.dot(&(p - t[0]))))
-}
-
-/// Whether an edge of `s`, whose corners are `d` away from `t`'s plane, runs through `t`'s inside.
-fn edge_pierces(s: &[Vector3<f64>; 3], d: &[f64; 3], t: &[Vector3<f64>; 3]) -> bool {
-    let n = (t[1] - t[0]).cross(&(t[2] - t[0]));
-    (0..3).any(|k| {
-        let (i, j) = (k, (k + 1) % 3);
-        let crosses = (d[i] > TOUCH_MM && d[j] < -TOUCH_MM) || (d[i] < -TOUCH_MM && d[j] > TOUCH_MM);
-        crosses && {
-            let p = s[i] + (s[j] - s[i]) * (d[i] / (d[i] - d[j]));
-            (0..3).all(|e| {
-                let (a, b) = (t[e], t[(e + 1) % 3]);
-                // Distance from the edge, inwards.
-                n.cross(&(b - a)).try_normalize(0.0).is_some_and(|inward| inward.dot(&(p - a)) > TOUCH_MM)
-            })
-        }
-    })
-}
-
-/// Whether two triangles in one plane overlap by more than the tolerance: no edge of either
-/// separates them.
-fn coplanar_overlap(s: &[Vector3<f64>; 3], t: &[Vector3<f64>; 3]) -> bool {
-    let separates = |a: &[Vector3<f64>; 3], b: &[Vector3<f64>; 3]| {
-        let n = (a[1] - a[0]).cross(&(a[2] - a[0]));
-        (0..3).any(|e| {
-            let (p, q) = (a[e], a[(e + 1) % 3]);
-            n.cross(&(q - p))
-                .try_normalize(0.0)
-                .is_none_or(|inward| b.iter().all(|x| inward.dot(&(x - p)) <= TOUCH_MM))
-        })
-    };
-    !separates(s, t) && !separates(t, s)
 }

@@ -1,21 +1,26 @@
-//! Parts of several instances: moved to their places, united where a body is common, compared where not.
+//! Several instances as one mechanism: everything in its place, bodies that are common planned, carved and bored once.
+//! A common body is the union of what each instance has drawn of it, primitive by primitive: one that two instances have in
+//! the same place is there once, so no two faces coincide, and what is cut out for one instance is not filled by another.
 
+use super::carve::{Carving, Cut, carve_bodies};
+use super::cycle::{CycleGaps, MovedState, carved_cycle_gaps};
 use super::distance::separation;
-use super::link::{BodyPlan, BoreCut};
+use super::gap::{Fusion, Member, fusions};
+use super::link::{BodyPlan, BoreCut, Role};
 use super::mesh::Mesh;
-use super::parts::FlexureSolid;
-use super::slot::{Facets, Slot};
-use super::tidy::{SHORT_EDGE_MM, without_short_edges};
-use super::union::{BooleanError, subtract_all, union_all};
+use super::parts::{BodySolid, FlexureSolid, GeometryError, PartsInput, build_part, groups};
+use super::slot::Slot;
 use crate::ir::Placement;
+use crate::math::Pose;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
-/// A bore is cut once more, this much wider and longer, where another instance has grown into it: no two faces
-/// then coincide, mm.
-const RECUT_MM: f64 = 0.01;
-/// Bores whose ends are nearer than this are one, mm.
-const SAME_BORE_MM: f64 = 1e-6;
+/// Primitives and bores whose places and sizes differ by less than this are one, mm.
+const SAME_MM: f64 = 1e-6;
+/// A primitive that overlaps one of an earlier instance is this much smaller for each instance before its own, mm: bars that
+/// leave a common boss would have faces in one plane. More than round facets stand back from their circle, less than a
+/// printer resolves.
+const SMALLER_MM: f64 = 0.02;
 
 impl Mesh {
     /// The mesh in another place; a mirror image keeps its outside outside.
@@ -38,85 +43,298 @@ impl Slot {
             ..*self
         }
     }
-}
 
-impl BoreCut {
-    fn placed(&self, placement: &Placement) -> BoreCut {
-        BoreCut { start: placement.point(&self.start), end: placement.point(&self.end), ..*self }
+    /// Whether it is the same solid.
+    fn is(&self, other: &Slot) -> bool {
+        let sizes = |s: &Slot| Vector3::new(s.disc_radius_mm, s.half_height_mm, s.round_mm);
+        let across = self.axis.cross(&other.axis).norm() * (self.half_height_mm + self.radius_mm());
+        let ball = self.half_height_mm == 0.0 && self.disc_radius_mm == 0.0;
+        same_ends((&self.start, &self.end), (&other.start, &other.end))
+            && (sizes(self) - sizes(other)).amax() < SAME_MM
+            && (ball || across < SAME_MM)
     }
 
-    /// The cylinder, grown by a margin.
-    fn slot(&self, margin_mm: f64) -> Slot {
-        let (middle, half) = ((self.start + self.end) / 2.0, (self.end - self.start).norm() / 2.0);
-        Slot {
-            start: middle,
-            end: middle,
-            axis: (self.end - self.start).try_normalize(0.0).unwrap_or_else(Vector3::z),
-            disc_radius_mm: self.diameter_mm / 2.0 + margin_mm,
-            half_height_mm: half + margin_mm,
-            round_mm: 0.0,
+    /// The slot with its faces moved inwards.
+    fn smaller(&self, by_mm: f64) -> Slot {
+        // What has no flat faces has its ball only.
+        if self.disc_radius_mm > 2.0 * by_mm && self.half_height_mm > 2.0 * by_mm {
+            let (disc_radius_mm, half_height_mm) = (self.disc_radius_mm - by_mm, self.half_height_mm - by_mm);
+            Slot { disc_radius_mm, half_height_mm, ..*self }
+        } else {
+            Slot { round_mm: (self.round_mm - by_mm).max(self.round_mm / 2.0), ..*self }
+        }
+    }
+}
+
+fn same_ends((a, b): (&Vector3<f64>, &Vector3<f64>), (start, end): (&Vector3<f64>, &Vector3<f64>)) -> bool {
+    let apart = |p: &Vector3<f64>, q: &Vector3<f64>| (a - p).norm().max((b - q).norm());
+    apart(start, end) < SAME_MM || apart(end, start) < SAME_MM
+}
+
+/// What an instance brings along.
+#[derive(Clone, Debug)]
+pub struct Share<'p> {
+    /// Its design in the rest pose.
+    pub input: &'p PartsInput,
+    /// The plans of its bodies.
+    pub plans: &'p [BodyPlan],
+    /// What its flexures have taken out of them.
+    pub carving: &'p Carving,
+    /// The states of the cycle, in the order of the whole.
+    pub states: Vec<&'p MovedState>,
+    /// Where it stands.
+    pub placement: Placement,
+    /// Which body of the whole each of its bodies is; all numbers up to the largest occur.
+    pub bodies: Vec<usize>,
+}
+
+/// Instances as one mechanism, in the coordinates of the assembly.
+#[derive(Clone, Debug)]
+pub struct Whole {
+    /// Flexures, clearances and names; nothing more is planned from it.
+    input: PartsInput,
+    /// Plans of the bodies.
+    plans: Vec<BodyPlan>,
+    states: Vec<MovedState>,
+    /// Links that made way.
+    pub carving: Carving,
+    /// The instances that have each body, with its index in each.
+    pub bodies: Vec<Vec<(usize, usize)>>,
+    /// The instance of each flexure, with its index in it.
+    pub flexures: Vec<(usize, usize)>,
+}
+
+/// Puts instances together.
+///
+/// # Errors
+/// A failure of the boolean kernel where a common link is carved.
+pub fn join(shares: &[Share<'_>]) -> Result<Whole, GeometryError> {
+    let count = shares.iter().flat_map(|s| &s.bodies).max().map_or(0, |last| last + 1);
+    let mut bodies: Vec<Vec<(usize, usize)>> = vec![Vec::new(); count];
+    let mut named: Vec<BodySolid> = vec![BodySolid::default(); count];
+    let mut plans: Vec<Vec<(BodyPlan, usize)>> = vec![Vec::new(); count];
+    let mut own = Carving::default();
+    let (mut solids, mut flexures): (Vec<FlexureSolid>, Vec<(usize, usize)>) = (Vec::new(), Vec::new());
+    let mut placed: Vec<Placed<'_>> = Vec::new();
+    let mut joint = 0;
+    for (i, share) in shares.iter().enumerate() {
+        let place = Placed { share, joint, flexure: flexures.len() };
+        for (b, (whole, plan)) in share.bodies.iter().zip(share.plans).enumerate() {
+            plans[*whole].push((place.plan(plan), bodies[*whole].len()));
+            if let (true, Some(body)) = (bodies[*whole].is_empty(), share.input.bodies.get(b)) {
+                named[*whole].name.clone_from(&body.name);
+            }
+            bodies[*whole].push((i, b));
+        }
+        solids.extend(share.input.flexures.iter().map(|f| place.flexure(f)));
+        flexures.extend((0..share.input.flexures.len()).map(|f| (i, f)));
+        joint += place.joints();
+        placed.push(place);
+    }
+    // A link of one instance is what it is there.
+    for place in &placed {
+        let alone = |b: usize| place.share.bodies.get(b).is_some_and(|w| bodies[*w].len() == 1);
+        own.cuts.extend(place.share.carving.cuts.iter().filter(|c| alone(c.body)).map(|c| place.cut(c)));
+        let links = place.share.carving.links.iter().filter(|(b, _)| alone(**b));
+        own.links.extend(links.map(|(b, m)| (place.share.bodies[*b], m.placed(&place.share.placement))));
+    }
+    let least = |of: fn(&PartsInput) -> f64| shares.iter().map(|s| of(s.input)).fold(0.0, f64::max);
+    let input = PartsInput {
+        height_mm: least(|i| i.height_mm),
+        clearance_mm: least(|i| i.clearance_mm),
+        least_wall_mm: least(|i| i.least_wall_mm),
+        bodies: named,
+        flexures: solids,
+        motion: Vec::new(),
+        facets: shares.first().map(|s| s.input.facets).unwrap_or_default(),
+    };
+    let states = states(&placed, count);
+    let plans: Vec<BodyPlan> = plans.into_iter().map(united).collect();
+    let common: Vec<usize> = (0..count).filter(|b| bodies[*b].len() > 1).collect();
+    let mut carving = carve_bodies(&input, &plans, &states, &common)?;
+    carving.cuts.extend(own.cuts);
+    carving.links.extend(own.links);
+    Ok(Whole { input, plans, states, carving, bodies, flexures })
+}
+
+/// A share with the numbers of the whole.
+struct Placed<'s> {
+    share: &'s Share<'s>,
+    /// Added to the indices of its joints.
+    joint: usize,
+    /// Added to the indices of its flexures.
+    flexure: usize,
+}
+
+impl Placed<'_> {
+    /// More than its largest index of a joint.
+    fn joints(&self) -> usize {
+        let input = self.share.input;
+        let of = |b: &BodySolid| {
+            let eyes = b.eyes.iter().map(|e| e.joint);
+            eyes.chain(b.guides.iter().map(|g| g.joint)).max()
+        };
+        let conventional = input.bodies.iter().filter_map(of);
+        conventional.chain(input.flexures.iter().map(|f| f.joint)).max().map_or(0, |last| last + 1)
+    }
+
+    fn plan(&self, plan: &BodyPlan) -> BodyPlan {
+        let p = &self.share.placement;
+        let role = |role: &Role| match *role {
+            Role::Stub(f) => Role::Stub(f + self.flexure),
+            Role::Eye(j) => Role::Eye(j + self.joint),
+            Role::Guide(j) => Role::Guide(j + self.joint),
+            other => other,
+        };
+        let bore = |b: &BoreCut| BoreCut {
+            joint: b.joint + self.joint,
+            start: p.point(&b.start),
+            end: p.point(&b.end),
+            ..*b
+        };
+        BodyPlan {
+            slots: plan.slots.iter().map(|(r, s)| (role(r), s.placed(p))).collect(),
+            // The whole is not varied any more.
+            follows: Vec::new(),
+            bores: plan.bores.iter().map(bore).collect(),
+            notes: plan.notes.clone(),
         }
     }
 
-    fn is(&self, other: &BoreCut) -> bool {
-        let ends = |a: &Vector3<f64>, b: &Vector3<f64>| {
-            (self.start - a).norm().max((self.end - b).norm()) < SAME_BORE_MM
+    fn flexure(&self, f: &FlexureSolid) -> FlexureSolid {
+        let p = &self.share.placement;
+        let body = |b: usize| self.share.bodies.get(b).copied().unwrap_or(usize::MAX);
+        FlexureSolid {
+            joint: f.joint + self.joint,
+            joint_point: p.point(&f.joint_point),
+            bodies: (body(f.bodies.0), body(f.bodies.1)),
+            centreline: f.centreline.iter().map(|x| p.point(x)).collect(),
+            // In a mirror image m1 × m2 would point against the tangent; sections are symmetric.
+            m1: f.m1.iter().map(|m| p.direction(m) * p.handedness()).collect(),
+            m2: f.m2.iter().map(|m| p.direction(m)).collect(),
+            ..f.clone()
+        }
+    }
+
+    fn cut(&self, cut: &Cut) -> Cut {
+        Cut {
+            body: self.share.bodies.get(cut.body).copied().unwrap_or(usize::MAX),
+            flexure: cut.flexure + self.flexure,
+            at: self.share.placement.point(&cut.at),
+            ..cut.clone()
+        }
+    }
+
+    fn pose(&self, pose: &Pose) -> Pose {
+        let p = &self.share.placement;
+        if *p == Placement::IDENTITY {
+            return *pose;
+        }
+        let turn = p.matrix();
+        Pose {
+            rotation: turn * pose.rotation * turn.transpose(),
+            translation: turn * pose.translation,
+            center: p.point(&pose.center),
+        }
+    }
+}
+
+/// The states that all instances have; a common body moves as the first one says.
+fn states(placed: &[Placed<'_>], bodies: usize) -> Vec<MovedState> {
+    let count = placed.iter().map(|p| p.share.states.len()).min().unwrap_or(0);
+    let state = |s: usize| {
+        let mut poses = vec![None; bodies];
+        let mut flexures = Vec::new();
+        for place in placed {
+            let Some(moved) = place.share.states.get(s) else { continue };
+            for (whole, pose) in place.share.bodies.iter().zip(&moved.poses) {
+                if let Some(slot) = poses.get_mut(*whole) {
+                    slot.get_or_insert_with(|| place.pose(pose));
+                }
+            }
+            flexures.extend(moved.flexures.iter().map(|f| place.flexure(f)));
+        }
+        let poses = poses.into_iter().map(|p| p.unwrap_or_else(|| Pose::rest(Vector3::zeros()))).collect();
+        MovedState { poses, flexures }
+    };
+    (0..count).map(state).collect()
+}
+
+/// One plan from those of all instances that have a body, each with the number of instances before.
+fn united(plans: Vec<(BodyPlan, usize)>) -> BodyPlan {
+    let mut out = BodyPlan::default();
+    for (plan, before) in plans {
+        let known = out.slots.len();
+        for (role, slot) in plan.slots {
+            let earlier = out.slots.get(..known).unwrap_or_default();
+            // A stub stays where its own flexure is cut free: each has its own.
+            let stub = matches!(role, Role::Stub(_));
+            if !stub && earlier.iter().any(|(r, s)| !matches!(r, Role::Stub(_)) && s.is(&slot)) {
+                continue;
+            }
+            let meets = earlier.iter().any(|(_, s)| separation(s, &slot).gap_mm < SMALLER_MM);
+            let by = if meets { SMALLER_MM * before as f64 } else { 0.0 };
+            out.slots.push((role, if by > 0.0 { slot.smaller(by) } else { slot }));
+        }
+        let known: Vec<BoreCut> = out.bores.clone();
+        let is = |a: &BoreCut, b: &BoreCut| {
+            same_ends((&a.start, &a.end), (&b.start, &b.end))
+                && (a.diameter_mm - b.diameter_mm).abs() < SAME_MM
         };
-        ends(&other.start, &other.end) || ends(&other.end, &other.start)
+        out.bores.extend(plan.bores.into_iter().filter(|b| !known.iter().any(|k| is(k, b))));
+        out.notes.extend(plan.notes);
     }
+    out
 }
 
-/// A printed part of an instance, with those of its bodies that other instances have too.
-#[derive(Clone, Debug)]
-pub struct Share<'p> {
-    /// The part's solid in its design.
-    pub mesh: &'p Mesh,
-    /// Where the instance stands.
-    pub placement: Placement,
-    /// Plans of the common bodies.
-    pub common: Vec<&'p BodyPlan>,
-}
-
-/// The parts as printed: those that have bodies in common as one solid, in as many pieces as they are. The largest
-/// piece comes first.
-///
-/// # Errors
-/// A failure of the boolean kernel.
-pub fn unite(shares: &[Share<'_>], facets: &Facets) -> Result<Vec<Mesh>, BooleanError> {
-    if let [only] = shares {
-        let stays = only.placement == Placement::IDENTITY;
-        let moved = || only.mesh.placed(&only.placement).rounded_to_f32().sorted();
-        return Ok(vec![if stays { only.mesh.clone() } else { moved() }]);
+impl Whole {
+    /// Bodies that are printed as one, in the order of their first bodies.
+    pub fn groups(&self) -> Vec<Vec<usize>> {
+        groups(&self.input)
     }
-    let placed: Vec<Mesh> = shares.iter().map(|s| s.mesh.placed(&s.placement)).collect();
-    let united = union_all(&placed)?;
-    let cut = subtract_all(&united, &overgrown(shares, facets))?;
-    Ok(pieces(&without_short_edges(&cut, SHORT_EDGE_MM).rounded_to_f32().sorted()))
-}
 
-/// The bores of common bodies that a body of another instance fills.
-fn overgrown(shares: &[Share<'_>], facets: &Facets) -> Vec<Mesh> {
-    let mut out = Vec::new();
-    for (i, share) in shares.iter().enumerate() {
-        for bore in share.common.iter().flat_map(|p| &p.bores) {
-            let bore = bore.placed(&share.placement);
-            let filled = shares.iter().enumerate().filter(|(j, _)| *j != i).any(|(_, other)| {
-                other.common.iter().any(|plan| {
-                    let mut own = plan.bores.iter().map(|b| b.placed(&other.placement));
-                    let hole = bore.slot(0.0);
-                    !own.any(|b| b.is(&bore))
-                        && plan
-                            .slots
-                            .iter()
-                            .any(|(_, s)| separation(&s.placed(&other.placement), &hole).gap_mm < 0.0)
-                })
-            });
-            if filled {
-                out.push(bore.slot(RECUT_MM).mesh(facets, 0.5));
+    /// The printed solid of a group, in as many pieces as it is, the largest first.
+    ///
+    /// # Errors
+    /// A failure of the boolean kernel.
+    pub fn build(&self, group: &[usize]) -> Result<Vec<Mesh>, GeometryError> {
+        Ok(pieces(&build_part(&self.input, &self.plans, &self.carving, group)?.mesh))
+    }
+
+    /// What overlaps or comes too near in the rest pose.
+    pub fn fusions(&self) -> Vec<Fusion> {
+        fusions(&self.input, &self.plans, &self.groups(), &self.carving)
+    }
+
+    /// Gaps over the cycle of everything that two instances take part in.
+    pub fn gaps(&self) -> CycleGaps {
+        let within = |a: Member, b: Member| match (self.owners(a).as_slice(), self.owners(b).as_slice()) {
+            ([i], [j]) => i == j,
+            _ => false,
+        };
+        carved_cycle_gaps(&self.plans, &self.states, &self.carving, self.input.clearance_mm, within)
+    }
+
+    /// The instances that a member belongs to, ascending.
+    pub fn owners(&self, member: Member) -> Vec<usize> {
+        match member {
+            Member::Body(b) => self.bodies.get(b).map(|m| m.iter().map(|(i, _)| *i).collect()),
+            Member::Flexure(f) => self.flexures.get(f).map(|(i, _)| vec![*i]),
+        }
+        .unwrap_or_default()
+    }
+
+    /// A member as one of an instance's design; none: it is not in it.
+    pub fn within(&self, instance: usize, member: Member) -> Option<Member> {
+        match member {
+            Member::Body(b) => {
+                self.bodies.get(b)?.iter().find(|(i, _)| *i == instance).map(|m| Member::Body(m.1))
+            }
+            Member::Flexure(f) => {
+                self.flexures.get(f).filter(|m| m.0 == instance).map(|m| Member::Flexure(m.1))
             }
         }
     }
-    out
 }
 
 /// The pieces of a mesh, the largest first, each with the cavities inside it.
@@ -166,28 +384,4 @@ fn used_box(mesh: &Mesh) -> (Vector3<f64>, Vector3<f64>) {
     let points = mesh.triangles.iter().flatten().filter_map(|i| mesh.vertices.get(*i));
     let infinite = Vector3::repeat(f64::INFINITY);
     points.fold((infinite, -infinite), |(lo, hi), p| (lo.inf(p), hi.sup(p)))
-}
-
-/// Something of an instance in the rest pose, in place.
-#[derive(Clone, Debug)]
-pub struct Standing {
-    /// Its primitives.
-    pub slots: Vec<Slot>,
-}
-
-impl Standing {
-    /// A body.
-    pub fn body(plan: &BodyPlan, placement: &Placement) -> Self {
-        Self { slots: plan.slots.iter().map(|(_, s)| s.placed(placement)).collect() }
-    }
-
-    /// A flexure.
-    pub fn flexure(flexure: &FlexureSolid, placement: &Placement) -> Self {
-        Self { slots: flexure.slots().iter().map(|s| s.placed(placement)).collect() }
-    }
-
-    /// Gap to another (mm, negative: they overlap) and its place, if it is less than a bound.
-    pub fn gap(&self, other: &Self, bound_mm: f64) -> Option<(f64, Vector3<f64>)> {
-        super::gap::worst(&self.slots, &other.slots, bound_mm)
-    }
 }

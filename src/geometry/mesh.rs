@@ -1,5 +1,6 @@
 //! Indexed triangle meshes: volume, area, box, and the rounding to `f32` that STL demands.
 
+use super::exact::LATTICE_PER_MM;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
@@ -54,12 +55,13 @@ impl Mesh {
         self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + offset)));
     }
 
-    /// The mesh as an STL file can hold it: coordinates rounded to `f32`, vertices that coincide
-    /// then merged, triangles that collapse then dropped together with pairs of triangles that
-    /// fold onto each other. A closed mesh stays closed. Unused vertices are dropped.
+    /// The mesh as an STL file can hold it and every reader takes it: coordinates rounded to `f32`, near zero not finer
+    /// than a lattice of 1e-6 mm (there `f32` tells vertices apart that readers merge), vertices that coincide then merged,
+    /// triangles that collapse then dropped together with pairs of triangles that fold onto each other. A closed mesh
+    /// stays closed. Unused vertices are dropped.
     pub fn rounded_to_f32(&self) -> Mesh {
         // Adding zero turns -0.0 into 0.0, so that both have one key.
-        let round = |x: f64| (x as f32) + 0.0;
+        let round = |x: f64| ((x * LATTICE_PER_MM).round() / LATTICE_PER_MM) as f32 + 0.0;
         let mut merged: BTreeMap<[u32; 3], usize> = BTreeMap::new();
         let mut out = Mesh::default();
         let mut target = Vec::with_capacity(self.vertices.len());

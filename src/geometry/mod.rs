@@ -12,7 +12,7 @@
 //! | `slot`, `sweep` | meshes of the primitives and of flexures |
 //! | `tidy` | removal of tiny edges before rounding to `f32` |
 //! | `union` | the boolean kernel's only client |
-//! | `mesh`, `check`, `ray` | triangle meshes, their facts, measurements on them |
+//! | `mesh`, `check`, `exact`, `ray` | triangle meshes, their facts by exact arithmetic, measurements on them |
 //! | `joined` | parts of several instances |
 //! | `distance`, `gap`, `cycle` | least distances, overlaps in the rest pose, gaps over a cycle |
 
@@ -22,6 +22,7 @@ pub mod carve;
 pub mod check;
 pub mod cycle;
 pub mod distance;
+pub mod exact;
 mod field;
 pub mod gap;
 mod guide;
@@ -54,7 +55,7 @@ pub use input::{flexure_solid, parts_input};
 pub use mesh::Mesh;
 pub use parts::{
     BodySolid, Bore, Eye, FlexureSolid, GeometryError, Guide, Part, Parts, PartsInput, build_carved_parts,
-    build_parts, plan_bodies,
+    build_parts, build_wanted_parts, plan_bodies,
 };
 pub use ray::Probe;
 pub use slot::{Facets, Slot};

@@ -209,7 +209,7 @@ impl std::error::Error for GeometryError {}
 /// rest pose are no errors: they are returned as [`Parts::fusions`].
 pub fn build_parts(input: &PartsInput) -> Result<Parts, GeometryError> {
     let plans = plan_bodies(input)?;
-    build_planned(input, plans, Carving::default())
+    build_planned(input, plans, Carving::default(), &|_| true)
 }
 
 /// The same with links carved where a flexure attached to them would hit them, in the rest pose or in one of the
@@ -218,18 +218,40 @@ pub fn build_parts(input: &PartsInput) -> Result<Parts, GeometryError> {
 /// # Errors
 /// As [`build_parts`].
 pub fn build_carved_parts(input: &PartsInput, states: &[MovedState]) -> Result<Parts, GeometryError> {
-    let plans = plan_bodies(input)?;
-    let carving = carve(input, &plans, states)?;
-    build_planned(input, plans, carving)
+    build_wanted_parts(input, states, &|_| true)
 }
 
-fn build_planned(input: &PartsInput, plans: Vec<BodyPlan>, carving: Carving) -> Result<Parts, GeometryError> {
+/// The same, meshed only where wanted, by the bodies of a part; the mesh of any other is empty.
+///
+/// # Errors
+/// As [`build_parts`].
+pub fn build_wanted_parts(
+    input: &PartsInput,
+    states: &[MovedState],
+    wanted: &(dyn Fn(&[usize]) -> bool + Sync),
+) -> Result<Parts, GeometryError> {
+    let plans = plan_bodies(input)?;
+    let carving = carve(input, &plans, states)?;
+    build_planned(input, plans, carving, wanted)
+}
+
+fn build_planned(
+    input: &PartsInput,
+    plans: Vec<BodyPlan>,
+    carving: Carving,
+    wanted: &(dyn Fn(&[usize]) -> bool + Sync),
+) -> Result<Parts, GeometryError> {
     let groups = groups(input);
     let fusions = fusions(input, &plans, &groups, &carving);
-    let parts = groups
-        .par_iter()
-        .map(|bodies| build_part(input, &plans, &carving, bodies))
-        .collect::<Result<Vec<Part>, GeometryError>>()?;
+    let build = |bodies: &Vec<usize>| {
+        if wanted(bodies) {
+            return build_part(input, &plans, &carving, bodies);
+        }
+        let name = bodies.first().map(|i| input.bodies[*i].name.clone()).unwrap_or_default();
+        let notes = bodies.iter().flat_map(|i| plans[*i].notes.iter().cloned()).collect();
+        Ok(Part { name, bodies: bodies.clone(), mesh: Mesh::default(), notes })
+    };
+    let parts = groups.par_iter().map(build).collect::<Result<Vec<Part>, GeometryError>>()?;
     Ok(Parts { parts, plans, carving, fusions })
 }
 
@@ -258,7 +280,8 @@ pub fn groups(input: &PartsInput) -> Vec<Vec<usize>> {
         .collect()
 }
 
-fn build_part(
+/// One solid of some bodies and the flexures between them.
+pub(super) fn build_part(
     input: &PartsInput,
     plans: &[BodyPlan],
     carving: &Carving,

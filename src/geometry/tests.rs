@@ -184,9 +184,47 @@ fn the_checker_finds_what_is_broken() {
     flat.vertices[center].x = 4.5;
     assert!(!crossing_pairs(&flat).is_empty());
 
+    // The same by less than a hundredth of a micrometre: exact arithmetic still sees it.
+    flat.vertices[center].x = 4.0 + 8e-6;
+    let facts = check_mesh(&flat);
+    assert!(facts.closed && facts.self_intersections > 0 && !facts.is_printable(), "{facts:?}");
+    // On the rim's edge the fan has a triangle without an area.
+    flat.vertices[center].x = 4.0;
+    assert!(check_mesh(&flat).flat > 0);
+
+    // Two balls that touch in one vertex: every edge is right, the vertex is not.
+    let ball = Slot::capsule(v(0.0, 0.0, 0.0), v(0.0, 0.0, 0.0), 5.0).mesh(&Facets::default(), 0.0);
+    let mut touching = ball.clone();
+    touching.vertices.iter_mut().for_each(|p| p.z -= 5.0);
+    let mut upper = ball;
+    upper.vertices.iter_mut().for_each(|p| p.z += 5.0);
+    touching.append(&upper);
+    let facts = check_mesh(&touching);
+    assert!(facts.closed && facts.oriented && facts.self_intersections == 0, "{facts:?}");
+    assert_eq!((facts.pinched, facts.is_sound()), (1, false));
+
     assert!(!check_mesh(&Mesh::default()).closed);
     let out_of_range = Mesh { vertices: vec![v(0.0, 0.0, 0.0)], triangles: vec![[0, 1, 2]] };
     assert!(!check_mesh(&out_of_range).closed);
+}
+
+/// Near zero `f32` tells vertices apart that readers of STL take for one: the checker does as they do, and what is
+/// written has none.
+#[test]
+fn vertices_that_readers_merge_are_merged() {
+    let mut mesh = sphere(v(0.0, 0.0, 0.0), 5.0).mesh(&Facets::default(), 0.0);
+    let j = mesh.vertices.iter().position(|p| p.x.abs() < 1e-9 && p.z.abs() < 4.0).unwrap();
+    let ids = *mesh.triangles.iter().find(|t| t.contains(&j)).unwrap();
+    let i = ids.into_iter().find(|i| *i != j).unwrap();
+    mesh.vertices[i] = mesh.vertices[j] + v(1e-8, 0.0, 0.0);
+    mesh.vertices[j].x = 0.0;
+    // Two numbers in single precision.
+    assert_ne!(mesh.vertices[i].x as f32, mesh.vertices[j].x as f32);
+    let facts = check_mesh(&mesh);
+    assert!(!facts.closed && facts.flat == 2, "{facts:?}");
+    let written = mesh.rounded_to_f32();
+    assert_eq!(written.triangles.len(), mesh.triangles.len() - 2);
+    assert!(check_mesh(&written).is_printable());
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::aims::AimSeries;
 use super::measure::{check_requirement, check_requirements, is_closed, measure};
 use super::report::{Measures, RequirementResult};
-use super::stages::Simulation;
+use super::stages::{Between, Simulation};
 use crate::diagnostic::Diagnostic;
 use crate::emit::csv::{MotionState, MotionTable};
 use crate::ir::assembly::AssemblyExport;
@@ -124,8 +124,8 @@ fn placed_pose(p: &Placement, (t, r): &([f64; 3], [f64; 3])) -> ([f64; 3], [f64;
 }
 
 /// One table for all instances: their columns side by side, a motor in common once, energies added, the largest
-/// stress and the least gap of all.
-pub fn combine(assembly: &Assembly, placed: Vec<Simulation>) -> Simulation {
+/// stress and the least gap of all, that between instances included.
+pub fn combine(assembly: &Assembly, placed: Vec<Simulation>, between: &Between) -> Simulation {
     if assembly.single().is_some() {
         return placed.into_iter().next().unwrap_or_default();
     }
@@ -168,12 +168,18 @@ pub fn combine(assembly: &Assembly, placed: Vec<Simulation>) -> Simulation {
             sum.load_potential_n_mm += s.load_potential_n_mm;
             sum.stress_max_mpa = sum.stress_max_mpa.max(s.stress_max_mpa);
         }
-        match out.gaps_mm.is_empty() {
-            true => out.gaps_mm.clone_from(&p.gaps_mm),
-            false => out.gaps_mm.iter_mut().zip(&p.gaps_mm).for_each(|(a, b)| *a = a.min(*b)),
-        }
+        nearer(&mut out.gaps_mm, &p.gaps_mm);
     }
+    nearer(&mut out.gaps_mm, &between.gaps_mm);
     out
+}
+
+/// The lesser of two gaps at every state; a list that is empty has none to compare.
+fn nearer(gaps_mm: &mut Vec<f64>, others_mm: &[f64]) {
+    match gaps_mm.is_empty() {
+        true => *gaps_mm = others_mm.to_vec(),
+        false => gaps_mm.iter_mut().zip(others_mm).for_each(|(a, b)| *a = a.min(*b)),
+    }
 }
 
 fn kept<T: Clone>(values: &[T], which: &[bool]) -> Vec<T> {
@@ -181,7 +187,7 @@ fn kept<T: Clone>(values: &[T], which: &[bool]) -> Vec<T> {
 }
 
 /// Measures by instance (`right.wheel`), a motor in common once, stress and gap of all.
-pub fn measure_all(assembly: &Assembly, placed: &[Simulation]) -> Measures {
+pub fn measure_all(assembly: &Assembly, placed: &[Simulation], between: &Between) -> Measures {
     let mut all = Measures::default();
     for (i, ((instance, design), simulation)) in assembly.placed().zip(placed).enumerate() {
         let own = measure(design, simulation);
@@ -199,6 +205,8 @@ pub fn measure_all(assembly: &Assembly, placed: &[Simulation]) -> Measures {
         all.stress.max_mpa = more(all.stress.max_mpa, own.stress.max_mpa, f64::max);
         all.gap.least_mm = more(all.gap.least_mm, own.gap.least_mm, f64::min);
     }
+    all.gap.least_mm =
+        between.gaps_mm.iter().fold(all.gap.least_mm, |least, g| more(least, Some(*g), f64::min));
     all
 }
 
@@ -214,6 +222,7 @@ pub fn check_all(
     assembly: &Assembly,
     designs: &[Simulation],
     placed: &[Simulation],
+    between: &Between,
     found: &mut Vec<Diagnostic>,
 ) -> Vec<RequirementResult> {
     let mut out = Vec::new();
@@ -228,7 +237,11 @@ pub fn check_all(
         return out;
     }
     let closed = assembly.designs.iter().all(is_closed);
-    let whole = combine(assembly, placed.to_vec());
+    let mut whole = combine(assembly, placed.to_vec(), between);
+    if assembly.instances.len() > 1 && between.gaps_mm.is_empty() {
+        // The gap of the whole is not that of its instances.
+        whole.gaps_mm.clear();
+    }
     for r in &assembly.requirements {
         let of = r.instance.and_then(|i| placed.get(i)).unwrap_or(&whole);
         out.push(check_requirement(&r.requirement, closed, of, found));

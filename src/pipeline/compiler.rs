@@ -7,7 +7,7 @@ use super::progress::Iteration;
 use super::report::Artefact;
 use super::solids;
 use super::stability;
-use super::stages::{Checked, Failed, Simulation, Solved, Stages};
+use super::stages::{Between, Checked, Failed, Simulation, Solved, Stages};
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
@@ -116,6 +116,21 @@ impl Stages for Compiler {
         Ok(Simulation { motion, errors_mm, aims, gaps_mm, stability, diagnostics })
     }
 
+    fn between(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Between {
+        if assembly.instances.len() < 2 {
+            return Between::default();
+        }
+        let planned = |(design, values): (&Design, &Vec<f64>)| {
+            let (layout, _) = layout(design, values).ok()?;
+            let model = Model::new(design, &layout, values, EDGES, false).ok()?;
+            let cycle = sweep(&model).ok()?;
+            solids::planned(design, &layout, &model, &cycle)
+        };
+        // What fails here has failed, and is told, where the designs were simulated.
+        let designs: Option<Vec<_>> = assembly.designs.iter().zip(values).map(planned).collect();
+        designs.map(|d| joined::between(assembly, &d)).unwrap_or_default()
+    }
+
     fn optimize(
         &self,
         design: &Design,
@@ -195,7 +210,7 @@ impl Stages for Compiler {
     ) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
         let mut found = Vec::new();
         let mut built = Vec::new();
-        for (design, values) in assembly.designs.iter().zip(values) {
+        for (d, (design, values)) in assembly.designs.iter().zip(values).enumerate() {
             solids::available(design)?;
             let (layout, _) = layout(design, values)?;
             let model =
@@ -204,9 +219,11 @@ impl Stages for Compiler {
             let solved = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
             let cycle = sweep(&solved).map_err(|e| lost(design, &e))?;
             let states = solids::states(design, &layout, &solved, &cycle);
-            let (parts, findings) = solids::build(design, &layout, &model, &states)?;
+            let (parts, findings) = solids::build(design, &layout, &model, &states, &|bodies| {
+                joined::stands_alone(assembly, d, bodies)
+            })?;
             found.extend(findings);
-            built.push(Solid { input: parts_input(design, &layout, &model), parts });
+            built.push(Solid { input: parts_input(design, &layout, &model), parts, states });
         }
         let (parts, findings) = joined::parts(assembly, &built)?;
         found.extend(findings);

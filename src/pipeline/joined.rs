@@ -1,10 +1,15 @@
 //! The printed parts of an assembly: those of its designs, in the places of their instances.
 
-use super::stages::Failed;
-use crate::diagnostic::Diagnostic;
-use crate::geometry::joined::{Share, Standing, unite};
-use crate::geometry::{Facets, Mesh, Parts, PartsInput};
+use super::stages::{Between, Failed};
+use crate::diagnostic::{Diagnostic, Origin};
+use crate::geometry::joined::{Share, Whole, join};
+use crate::geometry::link::BodyPlan;
+use crate::geometry::{
+    Carving, Fusion, GeometryError, LeastGap, Member, Mesh, MovedState, Part, Parts, PartsInput,
+    carved_cycle_gaps,
+};
 use crate::ir::{Assembly, Instance};
+use nalgebra::Vector3;
 
 /// A design in solids.
 pub struct Solid {
@@ -12,10 +17,42 @@ pub struct Solid {
     pub input: PartsInput,
     /// The parts in the design's coordinates.
     pub parts: Parts,
+    /// Its states over the cycle.
+    pub states: Vec<MovedState>,
 }
 
-/// A part of an instance: indices of both.
-type PartOf = (usize, usize);
+/// A design as it is planned.
+pub struct Planned {
+    /// What its parts are made of.
+    pub input: PartsInput,
+    /// Its bodies.
+    pub plans: Vec<BodyPlan>,
+    /// What made way.
+    pub carving: Carving,
+    /// Its states over the cycle.
+    pub states: Vec<MovedState>,
+}
+
+/// What is known of a design.
+struct Known<'s> {
+    input: &'s PartsInput,
+    plans: &'s [BodyPlan],
+    carving: &'s Carving,
+    states: &'s [MovedState],
+}
+
+impl Solid {
+    fn known(&self) -> Known<'_> {
+        let Parts { plans, carving, .. } = &self.parts;
+        Known { input: &self.input, plans, carving, states: &self.states }
+    }
+}
+
+impl Planned {
+    fn known(&self) -> Known<'_> {
+        Known { input: &self.input, plans: &self.plans, carving: &self.carving, states: &self.states }
+    }
+}
 
 /// A printed part.
 pub struct Printed {
@@ -30,28 +67,26 @@ pub struct Printed {
 /// # Errors
 /// Where parts cannot be united.
 pub fn parts(assembly: &Assembly, solids: &[Solid]) -> Result<(Vec<Printed>, Vec<Diagnostic>), Failed> {
+    if let (Some(_), [alone]) = (assembly.single(), solids) {
+        let named = |part: &Part| format!("{}_{}", assembly.name, part.name);
+        let print = |part: &Part| Printed { name: named(part), mesh: part.mesh.clone() };
+        return Ok((alone.parts.parts.iter().map(print).collect(), Vec::new()));
+    }
+    let failed = |name: &str, at: Origin| {
+        let name = name.to_string();
+        move |e: GeometryError| -> Failed {
+            vec![Diagnostic::error("E0630", format!("no solid comes out: `{name}`: {e}"), at)]
+        }
+    };
+    let known: Vec<Known<'_>> = solids.iter().map(Solid::known).collect();
+    let whole = joined(assembly, &known).map_err(failed(&assembly.name, assembly.origin))?;
     let (mut out, mut found) = (Vec::new(), Vec::new());
-    for group in groups(assembly, solids) {
-        let share = |&(i, p): &PartOf| {
-            let instance = assembly.instances.get(i)?;
-            let solid = solids.get(instance.design)?;
-            let part = solid.parts.parts.get(p)?;
-            let common = part.bodies.iter().filter(|b| joint_body(assembly, i, **b).is_some());
-            Some(Share {
-                mesh: &part.mesh,
-                placement: instance.placement,
-                common: common.filter_map(|b| solid.parts.plans.get(*b)).collect(),
-            })
+    for group in whole.groups() {
+        let Some((name, at)) = name(assembly, solids, &whole, &group) else { continue };
+        let pieces = match alone(assembly, solids, &whole, &group) {
+            Some(mesh) => vec![mesh],
+            None => whole.build(&group).map_err(failed(&name, at))?,
         };
-        let shares: Vec<Share<'_>> = group.iter().filter_map(share).collect();
-        let (name, at) = name(assembly, solids, &group);
-        let pieces = unite(&shares, &Facets::default()).map_err(|e| {
-            vec![Diagnostic::error(
-                "E0630",
-                format!("no solid comes out: `{name}` cannot be united: {e}"),
-                at,
-            )]
-        })?;
         if pieces.len() > 1 {
             let message = format!(
                 "`{name}` is printed in {} pieces: what is to be one body does not touch",
@@ -67,8 +102,33 @@ pub fn parts(assembly: &Assembly, solids: &[Solid]) -> Result<(Vec<Printed>, Vec
             out.push(Printed { name, mesh });
         }
     }
-    found.extend(in_the_way(assembly, solids));
+    found.extend(in_the_way(assembly, solids, &whole));
+    found.extend(not_carved(assembly, solids, &whole));
     Ok((out, found))
+}
+
+/// The instances as one mechanism, from what is known of each design.
+fn joined(assembly: &Assembly, designs: &[Known<'_>]) -> Result<Whole, GeometryError> {
+    let mut known: Vec<(usize, usize)> = Vec::new();
+    let mut count = 0;
+    let mut shares = Vec::new();
+    for (i, instance) in assembly.instances.iter().enumerate() {
+        let Some(Known { input, plans, carving, states }) = designs.get(instance.design) else { continue };
+        let mut number = |b: usize| {
+            let common = joint_body(assembly, i, b);
+            let met = common.and_then(|j| known.iter().find(|k| k.0 == j));
+            if let Some((_, number)) = met {
+                return *number;
+            }
+            count += 1;
+            known.extend(common.map(|j| (j, count - 1)));
+            count - 1
+        };
+        let bodies = (0..plans.len()).map(&mut number).collect();
+        let states = (0..states.len()).filter_map(|s| states.get(instance.state(s))).collect();
+        shares.push(Share { input, plans, carving, states, placement: instance.placement, bodies });
+    }
+    join(&shares)
 }
 
 /// The group of common bodies that a body belongs to.
@@ -76,129 +136,174 @@ fn joint_body(assembly: &Assembly, instance: usize, body: usize) -> Option<usize
     assembly.joined.iter().position(|j| j.members.contains(&(instance, body)))
 }
 
-/// Parts that have bodies in common, in the order of their first members.
-fn groups(assembly: &Assembly, solids: &[Solid]) -> Vec<Vec<PartOf>> {
-    /// Common bodies, and the parts they are in.
-    #[derive(Default)]
-    struct Group {
-        bodies: Vec<usize>,
-        members: Vec<PartOf>,
-    }
-    let mut groups: Vec<Group> = Vec::new();
-    for (i, instance) in assembly.instances.iter().enumerate() {
-        let parts = solids.get(instance.design).map(|s| s.parts.parts.as_slice()).unwrap_or_default();
-        for (p, part) in parts.iter().enumerate() {
-            let bodies = part.bodies.iter().filter_map(|b| joint_body(assembly, i, *b)).collect();
-            let mut group = Group { bodies, members: vec![(i, p)] };
-            let meets = |g: &Group| g.bodies.iter().any(|j| group.bodies.contains(j));
-            let (touched, rest): (Vec<Group>, Vec<Group>) = groups.into_iter().partition(meets);
-            for other in touched {
-                group.bodies.extend(other.bodies);
-                group.members.extend(other.members);
-            }
-            group.members.sort_unstable();
-            groups = rest;
-            groups.push(group);
-        }
-    }
-    let mut out: Vec<Vec<PartOf>> = groups.into_iter().map(|g| g.members).collect();
-    out.sort();
-    out
+/// Whether a part of a design is printed by itself in an instance: none of its bodies belongs to another one too.
+pub fn stands_alone(assembly: &Assembly, design: usize, bodies: &[usize]) -> bool {
+    let common = |i: usize, b: usize| {
+        joint_body(assembly, i, b).and_then(|j| assembly.joined.get(j)).is_some_and(|j| j.members.len() > 1)
+    };
+    let of_design = |(_, n): &(usize, &Instance)| n.design == design;
+    let mut instances = assembly.instances.iter().enumerate().filter(of_design);
+    instances.any(|(i, _)| bodies.iter().all(|b| !common(i, *b)))
 }
 
-/// What a group of parts is called, and what declares it.
-fn name(assembly: &Assembly, solids: &[Solid], group: &[PartOf]) -> (String, crate::ir::Origin) {
-    let Some((i, p)) = group.first() else { return (assembly.name.clone(), assembly.origin) };
-    let Some(instance) = assembly.instances.get(*i) else { return (assembly.name.clone(), assembly.origin) };
-    let part_of = |i: usize, p: usize| {
-        let design = assembly.instances.get(i)?.design;
-        solids.get(design)?.parts.parts.get(p)
-    };
-    let common = group.iter().filter_map(|(i, p)| Some((*i, part_of(*i, *p)?)));
-    let first = common
-        .flat_map(|(i, part)| part.bodies.iter().filter_map(move |b| joint_body(assembly, i, *b)))
-        .min();
-    if let Some(joined) = first.and_then(|j| assembly.joined.get(j)) {
-        return (format!("{}_{}", assembly.name, joined.name), joined.origin);
+/// A part that no other instance has a body of, in its place.
+fn alone(assembly: &Assembly, solids: &[Solid], whole: &Whole, group: &[usize]) -> Option<Mesh> {
+    let members: Vec<&(usize, usize)> = group.iter().filter_map(|b| whole.bodies.get(*b)).flatten().collect();
+    let [(i, b), ..] = members.as_slice() else { return None };
+    if members.len() > group.len() {
+        return None;
     }
-    let part = part_of(*i, *p).map_or("", |part| part.name.as_str());
-    let own = if instance.name.is_empty() { part.to_string() } else { format!("{}_{part}", instance.name) };
-    (format!("{}_{own}", assembly.name), instance.origin)
+    let instance = assembly.instances.get(*i)?;
+    let part = solids.get(instance.design)?.parts.parts.iter().find(|p| p.bodies.contains(b))?;
+    Some(part.mesh.placed(&instance.placement).rounded_to_f32().sorted())
+}
+
+/// What a group of bodies is called, and what declares it.
+fn name(assembly: &Assembly, solids: &[Solid], whole: &Whole, group: &[usize]) -> Option<(String, Origin)> {
+    let members = || group.iter().filter_map(|b| whole.bodies.get(*b)).flatten();
+    let common = members().filter_map(|(i, b)| joint_body(assembly, *i, *b)).min();
+    if let Some(joined) = common.and_then(|j| assembly.joined.get(j)) {
+        return Some((format!("{}_{}", assembly.name, joined.name), joined.origin));
+    }
+    let (i, b) = members().next()?;
+    let instance = assembly.instances.get(*i)?;
+    let body = solids.get(instance.design)?.input.bodies.get(*b)?;
+    Some((format!("{}_{}_{}", assembly.name, instance.name, body.name), instance.origin))
+}
+
+/// Two instances that meet, and how a member of each is called there.
+struct Meeting<'a> {
+    one: (&'a Instance, String),
+    other: (&'a Instance, String),
+    /// Indices of the two.
+    pair: (usize, usize),
+}
+
+/// Between which instances something is; none: it is within one, where `told` knows of it.
+fn meeting<'a>(
+    assembly: &'a Assembly,
+    whole: &Whole,
+    (a, b): (Member, Member),
+    told: impl Fn(usize, Member, Member) -> bool,
+) -> Option<Meeting<'a>> {
+    let (first, second) = (whole.owners(a), whole.owners(b));
+    let within = first.iter().find(|i| second.contains(i));
+    let (i, j) = match within {
+        None => (*first.first()?, *second.first()?),
+        Some(i) => {
+            if told(*i, whole.within(*i, a)?, whole.within(*i, b)?) {
+                return None;
+            }
+            // A common body: what another instance has of it is in the way.
+            let other = |of: &[usize]| of.iter().copied().find(|k| k != i);
+            other(&second).map(|j| (*i, j)).or_else(|| other(&first).map(|j| (j, *i)))?
+        }
+    };
+    let called = |i: usize, m: Member| {
+        let instance = assembly.instances.get(i)?;
+        let design = assembly.designs.get(instance.design)?;
+        let name = match whole.within(i, m)? {
+            Member::Body(b) => &design.bodies.get(b)?.name,
+            Member::Flexure(f) => &design.rods.get(f)?.path,
+        };
+        Some((instance, instance.of(name)))
+    };
+    Some(Meeting { one: called(i, a)?, other: called(j, b)?, pair: (i.min(j), i.max(j)) })
 }
 
 /// Instances that stand in each other's way in the rest pose, each pair once, at the worst place.
-fn in_the_way(assembly: &Assembly, solids: &[Solid]) -> Vec<Diagnostic> {
-    let standing: Vec<Vec<(String, Option<usize>, Standing)>> = assembly
-        .instances
-        .iter()
-        .enumerate()
-        .map(|(i, instance)| match solids.get(instance.design) {
-            Some(solid) => members(assembly, i, instance, solid),
-            None => Vec::new(),
-        })
-        .collect();
-    let mut found = Vec::new();
-    for (i, first) in standing.iter().enumerate() {
-        for (j, second) in standing.iter().enumerate().skip(i + 1) {
-            let (Some(one), Some(other)) = (assembly.instances.get(i), assembly.instances.get(j)) else {
-                continue;
-            };
-            let bound = assembly.designs.get(one.design).map_or(0.0, |d| d.process.clearance_mm);
-            let mut worst: Option<(f64, nalgebra::Vector3<f64>, &str, &str)> = None;
-            for (name, joined, a) in first {
-                for (also, joined_too, b) in second {
-                    // What is one body is not in its own way.
-                    if joined.is_some() && joined == joined_too {
-                        continue;
-                    }
-                    let bound = worst.map_or(bound, |w| w.0);
-                    if let Some((gap, at)) = a.gap(b, bound) {
-                        worst = Some((gap, at, name, also));
-                    }
-                }
-            }
-            if let Some((gap, at, a, b)) = worst {
-                found.push(told(gap, at, (a, one), (b, other), bound));
-            }
+fn in_the_way(assembly: &Assembly, solids: &[Solid], whole: &Whole) -> Vec<Diagnostic> {
+    let known = |i: usize, a: Member, b: Member| {
+        let solid = assembly.instances.get(i).and_then(|n| solids.get(n.design));
+        solid.is_some_and(|s| s.parts.fusions.iter().any(|f| (f.a, f.b) == (a, b) || (f.b, f.a) == (a, b)))
+    };
+    let mut worst: Vec<(Fusion, Meeting<'_>)> = Vec::new();
+    for fusion in whole.fusions() {
+        let Some(meeting) = meeting(assembly, whole, (fusion.a, fusion.b), known) else { continue };
+        match worst.iter_mut().find(|w| w.1.pair == meeting.pair) {
+            Some(w) if fusion.depth_mm > w.0.depth_mm => *w = (fusion, meeting),
+            Some(_) => {}
+            None => worst.push((fusion, meeting)),
         }
     }
-    found
+    worst.sort_by_key(|w| w.1.pair);
+    let clearance = |n: &Instance| assembly.designs.get(n.design).map_or(0.0, |d| d.process.clearance_mm);
+    worst.iter().map(|(f, m)| told(f, m, clearance(m.one.0))).collect()
 }
 
-/// Bodies and flexures of an instance: what each is called, the common body it is, and where it stands.
-fn members(
-    assembly: &Assembly,
-    index: usize,
-    instance: &Instance,
-    solid: &Solid,
-) -> Vec<(String, Option<usize>, Standing)> {
-    let p = &instance.placement;
-    let bodies = solid.input.bodies.iter().zip(&solid.parts.plans).enumerate();
-    let bodies = bodies.map(|(b, (body, plan))| {
-        (instance.of(&body.name), joint_body(assembly, index, b), Standing::body(plan, p))
-    });
-    let flexures = solid.input.flexures.iter().map(|f| (instance.of(&f.path), None, Standing::flexure(f, p)));
-    bodies.chain(flexures).collect()
-}
-
-fn told(
-    gap: f64,
-    at: nalgebra::Vector3<f64>,
-    (a, one): (&str, &Instance),
-    (b, other): (&str, &Instance),
-    clearance: f64,
-) -> Diagnostic {
-    let place = format!("near ({:.1}, {:.1}, {:.1}) mm", at.x, at.y, at.z);
-    let d = if gap < 0.0 {
+fn told(fusion: &Fusion, meeting: &Meeting<'_>, clearance: f64) -> Diagnostic {
+    let ((one, a), (other, b)) = (&meeting.one, &meeting.other);
+    let place = near(&fusion.at);
+    let d = if fusion.depth_mm > 0.0 {
         Diagnostic::error(
             "E0641",
             format!("`{a}` and `{b}` stand in each other's way in the rest pose"),
             other.origin,
         )
-        .label(format!("they overlap by {:.2} mm {place}", -gap))
+        .label(format!("they overlap by {:.2} mm {place}", fusion.depth_mm))
     } else {
+        let gap = -fusion.depth_mm;
         Diagnostic::warning("W0642", format!("`{a}` and `{b}` are printed {gap:.2} mm apart"), other.origin)
             .label(format!("{place}; the process needs {clearance:.2} mm"))
     };
     d.also(one.origin, "the other one").help("move the instances apart, or give them the body in common")
+}
+
+fn near(p: &Vector3<f64>) -> String {
+    format!("near ({:.1}, {:.1}, {:.1}) mm", p.x, p.y, p.z)
+}
+
+/// Common links that could not make way for a flexure, where that is not told of the design alone.
+fn not_carved(assembly: &Assembly, solids: &[Solid], whole: &Whole) -> Vec<Diagnostic> {
+    let mut found = Vec::new();
+    for cut in whole.carving.cuts.iter().filter(|c| !c.made) {
+        let owner = whole.flexures.get(cut.flexure);
+        let Some((i, flexure)) = owner.copied() else { continue };
+        let Some(Member::Body(body)) = whole.within(i, Member::Body(cut.body)) else { continue };
+        let Some(instance) = assembly.instances.get(i) else { continue };
+        let (design, solid) = (assembly.designs.get(instance.design), solids.get(instance.design));
+        let (Some(design), Some(solid)) = (design, solid) else { continue };
+        let same = |c: &crate::geometry::Cut| (c.body, c.flexure) == (body, flexure) && !c.made;
+        if !solid.parts.carving.cuts.iter().any(same) {
+            let local = crate::geometry::Cut { body, flexure, ..cut.clone() };
+            found.push(super::solids::uncarved(design, &local));
+        }
+    }
+    found
+}
+
+/// Gaps between instances over the cycle: what each design says of itself is left out.
+pub fn between(assembly: &Assembly, designs: &[Planned]) -> Between {
+    let all: Vec<Known<'_>> = designs.iter().map(Planned::known).collect();
+    // Where no solid comes out the mesh stage says why.
+    let Ok(whole) = joined(assembly, &all) else { return Between::default() };
+    let gaps = whole.gaps();
+    let known = |i: usize, a: Member, b: Member| {
+        let Some(p) = assembly.instances.get(i).and_then(|n| designs.get(n.design)) else { return false };
+        let others = |x: Member, y: Member| (x, y) != (a, b) && (y, x) != (a, b);
+        let own = carved_cycle_gaps(&p.plans, &p.states, &p.carving, p.input.clearance_mm, others);
+        !own.overlaps.is_empty()
+    };
+    let told = |o: &LeastGap| Some(collision(o, &meeting(assembly, &whole, (o.a, o.b), known)?));
+    Between {
+        gaps_mm: gaps.least.iter().filter_map(|g| g.map(|g| g.gap_mm)).collect(),
+        diagnostics: gaps.overlaps.iter().filter_map(told).collect(),
+    }
+}
+
+fn collision(worst: &LeastGap, meeting: &Meeting<'_>) -> Diagnostic {
+    let ((one, a), (other, b)) = (&meeting.one, &meeting.other);
+    let (code, message) = match (worst.a, worst.b) {
+        (Member::Body(_), Member::Body(_)) => ("W0635", format!("`{a}` and `{b}` collide on the way")),
+        _ => ("W0636", format!("`{b}` rubs against `{a}` on the way")),
+    };
+    Diagnostic::warning(code, message, other.origin)
+        .label(format!(
+            "at state {} they overlap by {:.2} mm {}",
+            worst.state,
+            -worst.gap_mm,
+            near(&worst.at)
+        ))
+        .also(one.origin, "the other one")
+        .help("move the instances apart, or narrow what they drive")
 }

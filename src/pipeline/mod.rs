@@ -21,7 +21,7 @@ pub use report::{
     StressMeasures, TraceMeasures,
 };
 pub use stability::{DriveValues, LimitPoint, RestState, SnapThrough, Stability};
-pub use stages::{Checked, Failed, Simulation, Solved, Stages};
+pub use stages::{Between, Checked, Failed, Simulation, Solved, Stages};
 
 use crate::diagnostic::{Diagnostic, Severity};
 pub use crate::elaborate::{FileError, Files};
@@ -98,16 +98,22 @@ fn run_build(
     let clock = Clock::start(progress, Stage::Simulate);
     let start = |d: &Design| stages.simulate(d, &starts(d));
     let before: Option<Vec<Simulation>> = assembly.designs.iter().map(|d| start(d).ok()).collect();
-    out.before = before.map(|b| assembly::measure_all(&assembly, &assembly::place(&assembly, &b)));
+    out.before = before.map(|b| {
+        let started: Vec<Vec<f64>> = assembly.designs.iter().map(starts).collect();
+        let between = stages.between(&assembly, &started);
+        assembly::measure_all(&assembly, &assembly::place(&assembly, &b), &between)
+    });
     let after = assembly.designs.iter().zip(&values);
     let after = after.map(|(d, v)| stages.simulate(d, v)).collect::<Result<Vec<Simulation>, Failed>>();
     let simulations = keep(after, &mut out.diagnostics);
+    let between = simulations.as_ref().map(|_| stages.between(&assembly, &values)).unwrap_or_default();
     clock.stop(&mut out.seconds.solve);
     let simulations = simulations?;
     tell_once(simulations.iter().flat_map(|s| s.diagnostics.iter().cloned()), out);
+    tell_once(between.diagnostics.iter().cloned(), out);
     let placed = assembly::place(&assembly, &simulations);
-    out.after = Some(assembly::measure_all(&assembly, &placed));
-    out.requirements = assembly::check_all(&assembly, &simulations, &placed, &mut out.diagnostics);
+    out.after = Some(assembly::measure_all(&assembly, &placed, &between));
+    out.requirements = assembly::check_all(&assembly, &simulations, &placed, &between, &mut out.diagnostics);
 
     // Values to files.
     let clock = Clock::start(progress, Stage::Mesh);
@@ -142,11 +148,12 @@ pub fn simulate(
     let simulation = front_end(request, stages, files, &mut out).and_then(|assembly| {
         // Where nothing of the geometry is free, the conventional motion needs no lock.
         let drawn = assembly.designs.iter().all(|d| d.geometry_variables().is_empty());
+        let mut between = Between::default();
         let simulations = if show.rigid && drawn {
             let rigid = assembly.designs.iter().map(|d| stages.rigid(d, &starts(d)));
             keep(rigid.collect::<Result<Vec<_>, Failed>>(), &mut out.diagnostics)?
         } else {
-            let mut found = Vec::new();
+            let (mut found, mut solved) = (Vec::new(), Vec::new());
             for (design, lock) in assembly.designs.iter().zip(read_locks(request, &assembly, &mut out).ok()?)
             {
                 let solution = match lock {
@@ -161,15 +168,18 @@ pub fn simulate(
                 let shown =
                     if show.rigid { stages.rigid(design, &values) } else { stages.simulate(design, &values) };
                 found.push(keep(shown, &mut out.diagnostics)?);
+                solved.push(values);
             }
             // The conventional motion's findings have been told by the check.
             if !show.rigid {
                 tell_once(found.iter().flat_map(|s| s.diagnostics.iter().cloned()), &mut out);
+                between = stages.between(&assembly, &solved);
+                tell_once(between.diagnostics.iter().cloned(), &mut out);
             }
             found
         };
         let placed = assembly::place(&assembly, &simulations);
-        let mut simulation = assembly::combine(&assembly, placed);
+        let mut simulation = assembly::combine(&assembly, placed, &between);
         if !show.poses {
             simulation.motion.bodies.clear();
         }

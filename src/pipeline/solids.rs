@@ -1,16 +1,17 @@
 //! The geometry stage as the pipeline uses it: what can be printed, and its findings as diagnostics.
 
+use super::joined::Planned;
 use super::stages::Failed;
 use crate::diagnostic::Diagnostic;
 use crate::equilibrium::{Cycle, Layout, Model};
 use crate::geometry::{
-    Carving, Cut, CycleGaps, Fusion, GeometryError, LeastGap, Member, MovedState, Parts, build_carved_parts,
+    Carving, Cut, CycleGaps, Fusion, GeometryError, LeastGap, Member, MovedState, Parts, build_wanted_parts,
     carve, carved_cycle_gaps, flexure_solid, parts_input, plan_bodies,
 };
 use crate::ir::{Design, ExportKind, Joint, JointKind};
 
 /// Builds the printed parts of a design in its rest pose; links make way for their own flexures in the `states` of the
-/// cycle.
+/// cycle. Meshed is only what is `wanted`, by the bodies of a part.
 ///
 /// # Errors
 /// Where no solid comes out.
@@ -19,9 +20,10 @@ pub fn build(
     layout: &Layout,
     model: &Model,
     states: &[MovedState],
+    wanted: &(dyn Fn(&[usize]) -> bool + Sync),
 ) -> Result<(Parts, Vec<Diagnostic>), Failed> {
     let input = parts_input(design, layout, model);
-    let parts = build_carved_parts(&input, states).map_err(|e| no_solid(design, &e))?;
+    let parts = build_wanted_parts(&input, states, wanted).map_err(|e| no_solid(design, &e))?;
     let found = parts.fusions.iter().map(|f| fusion(design, f)).collect();
     Ok((parts, found))
 }
@@ -80,15 +82,21 @@ pub fn states(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) ->
 /// where there are no solids to measure (the mesh stage says why): a gap of parts that cannot be made yet would be a
 /// guess.
 pub fn gaps(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> (CycleGaps, Carving) {
-    let found = available(design).ok().and_then(|()| {
-        let input = parts_input(design, layout, model);
-        let plans = plan_bodies(&input).ok()?;
-        let states = states(design, layout, model, cycle);
-        let carving = carve(&input, &plans, &states).ok()?;
-        let gaps = carved_cycle_gaps(&plans, &states, &carving, input.clearance_mm, |_, _| false);
-        Some((gaps, carving))
-    });
-    found.unwrap_or_default()
+    let Some(Planned { input, plans, carving, states }) = planned(design, layout, model, cycle) else {
+        return Default::default();
+    };
+    let gaps = carved_cycle_gaps(&plans, &states, &carving, input.clearance_mm, |_, _| false);
+    (gaps, carving)
+}
+
+/// A design as it is planned; none where there are no solids to measure.
+pub fn planned(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> Option<Planned> {
+    available(design).ok()?;
+    let input = parts_input(design, layout, model);
+    let plans = plan_bodies(&input).ok()?;
+    let states = states(design, layout, model, cycle);
+    let carving = carve(&input, &plans, &states).ok()?;
+    Some(Planned { input, plans, carving, states })
 }
 
 /// Links that could not make way for their own flexures, each at the flexure's joint.
@@ -96,7 +104,7 @@ pub fn not_carved(design: &Design, carving: &Carving) -> Vec<Diagnostic> {
     carving.cuts.iter().filter(|c| !c.made).map(|c| uncarved(design, c)).collect()
 }
 
-fn uncarved(design: &Design, cut: &Cut) -> Diagnostic {
+pub(super) fn uncarved(design: &Design, cut: &Cut) -> Diagnostic {
     let (body, rod) = (&design.bodies[cut.body], &design.rods[cut.flexure]);
     let process = &design.process;
     let why = match cut.wall_mm {

@@ -42,6 +42,15 @@ pub struct Simulation {
     pub diagnostics: Vec<Diagnostic>,
 }
 
+/// What instances are to each other over the cycle.
+#[derive(Clone, Debug, Default)]
+pub struct Between {
+    /// Least gap of the printed solids of two instances at every state, mm; empty where there is nothing to compare.
+    pub gaps_mm: Vec<f64>,
+    /// Where they meet.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
 /// What the optimiser gives.
 #[derive(Clone, Debug, Default)]
 pub struct Solved {
@@ -75,6 +84,12 @@ pub trait Stages {
     /// # Errors
     /// Where no equilibrium is found.
     fn simulate(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed>;
+
+    /// What the instances of an assembly are to each other; `values` are those of each design. Nothing where there is one
+    /// instance, or no printed form.
+    fn between(&self, _assembly: &Assembly, _values: &[Vec<f64>]) -> Between {
+        Between::default()
+    }
 
     /// The best design from a start; stops early when `cancel` is set.
     ///

@@ -6,6 +6,8 @@ pub mod gradient;
 
 use flexura::elaborate::{FileError, Files};
 use flexura::ir::Design;
+use flexura::pipeline::Artefact;
+use std::process::Command;
 
 /// Files of the Chebyshev example.
 pub struct ExampleFiles;
@@ -62,4 +64,31 @@ pub fn skipped() -> bool {
         eprintln!("skipped: set FLEXURA_EXTENDED=1 to run it");
     }
     skip
+}
+
+/// Asks trimesh, Manifold and CGAL about written parts (`tests/external/check_meshes.py`). Without them it says so and
+/// passes, unless `FLEXURA_EXTERNAL=1` demands them; `FLEXURA_PYTHON` names the interpreter that has them.
+pub fn accepted_by_others(parts: &[Artefact]) {
+    let python = std::env::var("FLEXURA_PYTHON").unwrap_or_else(|_| "python3".into());
+    let asked = |arguments: &[&std::ffi::OsStr]| Command::new(&python).args(arguments).output();
+    let tools = asked(&["-c".as_ref(), "import trimesh, manifold3d, CGAL".as_ref()]);
+    if !tools.is_ok_and(|o| o.status.success()) {
+        let needs = format!("{python} needs trimesh, manifold3d and cgal");
+        assert!(std::env::var_os("FLEXURA_EXTERNAL").is_none(), "FLEXURA_EXTERNAL is set: {needs}");
+        eprintln!("skipped: {needs}");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let script = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/external/check_meshes.py");
+    let mut arguments = vec![script.into_os_string()];
+    for part in parts {
+        let path = folder.path().join(&part.name);
+        std::fs::write(&path, &part.bytes).unwrap();
+        arguments.push(path.into_os_string());
+    }
+    assert!(arguments.len() > 1, "there are parts");
+    let arguments: Vec<&std::ffi::OsStr> = arguments.iter().map(|a| a.as_os_str()).collect();
+    let out = asked(&arguments).unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    assert!(out.status.success(), "{}{}", text(&out.stdout), text(&out.stderr));
 }
