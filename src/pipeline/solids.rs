@@ -1,5 +1,6 @@
 //! The geometry stage as the pipeline uses it: what can be printed, and its findings as diagnostics.
 
+use super::report::Place;
 use super::stages::Failed;
 use crate::diagnostic::Diagnostic;
 use crate::equilibrium::{Cycle, Layout, Model};
@@ -89,6 +90,16 @@ pub fn gaps(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> (
         Some((gaps, carving))
     });
     found.unwrap_or_default()
+}
+
+/// The nearest two over the whole cycle, with their gap (mm).
+pub fn nearest(design: &Design, gaps: &CycleGaps) -> Option<(f64, Place)> {
+    let least = gaps.least.iter().flatten().min_by(|a, b| a.gap_mm.total_cmp(&b.gap_mm))?;
+    let of = [least.a, least.b].map(|m| match m {
+        Member::Body(b) => design.bodies.get(b).map_or(String::new(), |b| b.name.clone()),
+        Member::Flexure(r) => design.rods.get(r).map_or(String::new(), |r| r.path.clone()),
+    });
+    Some((least.gap_mm, Place { of: of.to_vec(), state: least.state }))
 }
 
 /// Links that could not make way for their own flexures, each at the flexure's joint.
