@@ -3,7 +3,7 @@
 use super::distance::separation;
 use super::link::{BodyPlan, BoreCut};
 use super::mesh::Mesh;
-use super::parts::FlexureSolid;
+use super::parts::{BodySolid, FlexureSolid, GeometryError, PartsInput, build_parts};
 use super::slot::{Facets, Slot};
 use super::tidy::{SHORT_EDGE_MM, without_short_edges};
 use super::union::{BooleanError, subtract_all, union_all};
@@ -75,6 +75,32 @@ pub struct Share<'p> {
     pub placement: Placement,
     /// Plans of the common bodies.
     pub common: Vec<&'p BodyPlan>,
+}
+
+/// A body of an assembly by itself: round bars through its points (mm), of the sizes that links of `like` have.
+///
+/// # Errors
+/// Points that are no places, or a failure of the boolean kernel.
+pub fn frame(
+    name: &str,
+    points: &[Vector3<f64>],
+    like: &PartsInput,
+) -> Result<(Mesh, BodyPlan), GeometryError> {
+    let body = BodySolid { name: name.into(), skeleton: points.to_vec(), ..BodySolid::default() };
+    let input = PartsInput {
+        bodies: vec![body],
+        flexures: Vec::new(),
+        motion: Vec::new(),
+        height_mm: like.height_mm,
+        clearance_mm: like.clearance_mm,
+        least_wall_mm: like.least_wall_mm,
+        facets: like.facets.clone(),
+    };
+    let made = build_parts(&input)?;
+    match (made.parts.into_iter().next(), made.plans.into_iter().next()) {
+        (Some(part), Some(plan)) => Ok((part.mesh, plan)),
+        _ => Err(GeometryError::NoSkeleton(name.into())),
+    }
 }
 
 /// The parts as printed: those that have bodies in common as one solid, in as many pieces as they are. The largest

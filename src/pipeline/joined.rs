@@ -2,9 +2,11 @@
 
 use super::stages::Failed;
 use crate::diagnostic::Diagnostic;
-use crate::geometry::joined::{Share, Standing, unite};
+use crate::geometry::joined::{Share, Standing, frame, unite};
+use crate::geometry::link::BodyPlan;
 use crate::geometry::{Facets, Mesh, Parts, PartsInput};
-use crate::ir::{Assembly, Instance};
+use crate::ir::{Assembly, Instance, Origin, Placement};
+use nalgebra::Vector3;
 
 /// A design in solids.
 pub struct Solid {
@@ -31,6 +33,7 @@ pub struct Printed {
 /// Where parts cannot be united.
 pub fn parts(assembly: &Assembly, solids: &[Solid]) -> Result<(Vec<Printed>, Vec<Diagnostic>), Failed> {
     let (mut out, mut found) = (Vec::new(), Vec::new());
+    let frames = frames(assembly, solids)?;
     for group in groups(assembly, solids) {
         let share = |&(i, p): &PartOf| {
             let instance = assembly.instances.get(i)?;
@@ -43,7 +46,9 @@ pub fn parts(assembly: &Assembly, solids: &[Solid]) -> Result<(Vec<Printed>, Vec
                 common: common.filter_map(|b| solid.parts.plans.get(*b)).collect(),
             })
         };
-        let shares: Vec<Share<'_>> = group.iter().filter_map(share).collect();
+        let own = frames.iter().filter(|f| group.iter().any(|part| holds(assembly, solids, part, f.joined)));
+        let own = own.map(|f| Share { mesh: &f.mesh, placement: Placement::IDENTITY, common: vec![&f.plan] });
+        let shares: Vec<Share<'_>> = group.iter().filter_map(share).chain(own).collect();
         let (name, at) = name(assembly, solids, &group);
         let pieces = unite(&shares, &Facets::default()).map_err(|e| {
             vec![Diagnostic::error(
@@ -67,8 +72,38 @@ pub fn parts(assembly: &Assembly, solids: &[Solid]) -> Result<(Vec<Printed>, Vec
             out.push(Printed { name, mesh });
         }
     }
-    found.extend(in_the_way(assembly, solids));
+    found.extend(in_the_way(assembly, solids, &frames));
     Ok((out, found))
+}
+
+/// What a body of the assembly adds to the grounds merged into it.
+struct Frame {
+    /// Index into [`Assembly::joined`].
+    joined: usize,
+    mesh: Mesh,
+    plan: BodyPlan,
+}
+
+/// The bodies of the assembly that have points of their own, as thick as the links of the first ground merged into each.
+fn frames(assembly: &Assembly, solids: &[Solid]) -> Result<Vec<Frame>, Failed> {
+    let mut out = Vec::new();
+    for (index, joined) in assembly.joined.iter().enumerate().filter(|(_, j)| !j.skeleton.is_empty()) {
+        let first = joined.members.first().and_then(|(i, _)| assembly.instances.get(*i));
+        let Some(like) = first.and_then(|i| solids.get(i.design)) else { continue };
+        let points: Vec<Vector3<f64>> = joined.skeleton.iter().map(|p| Vector3::from(*p)).collect();
+        let (mesh, plan) = frame(&joined.name, &points, &like.input).map_err(|e| {
+            vec![Diagnostic::error("E0630", format!("no solid comes out: {e}"), joined.origin)]
+        })?;
+        out.push(Frame { joined: index, mesh, plan });
+    }
+    Ok(out)
+}
+
+/// Whether a part of an instance has a body that belongs to a common one.
+fn holds(assembly: &Assembly, solids: &[Solid], (i, p): &PartOf, joined: usize) -> bool {
+    let design = assembly.instances.get(*i).map(|n| n.design);
+    let part = design.and_then(|d| solids.get(d)?.parts.parts.get(*p));
+    part.is_some_and(|part| part.bodies.iter().any(|b| joint_body(assembly, *i, *b) == Some(joined)))
 }
 
 /// The group of common bodies that a body belongs to.
@@ -107,7 +142,7 @@ fn groups(assembly: &Assembly, solids: &[Solid]) -> Vec<Vec<PartOf>> {
 }
 
 /// What a group of parts is called, and what declares it.
-fn name(assembly: &Assembly, solids: &[Solid], group: &[PartOf]) -> (String, crate::ir::Origin) {
+fn name(assembly: &Assembly, solids: &[Solid], group: &[PartOf]) -> (String, Origin) {
     let Some((i, p)) = group.first() else { return (assembly.name.clone(), assembly.origin) };
     let Some(instance) = assembly.instances.get(*i) else { return (assembly.name.clone(), assembly.origin) };
     let part_of = |i: usize, p: usize| {
@@ -126,52 +161,62 @@ fn name(assembly: &Assembly, solids: &[Solid], group: &[PartOf]) -> (String, cra
     (format!("{}_{own}", assembly.name), instance.origin)
 }
 
-/// Instances that stand in each other's way in the rest pose, each pair once, at the worst place.
-fn in_the_way(assembly: &Assembly, solids: &[Solid]) -> Vec<Diagnostic> {
-    let standing: Vec<Vec<(String, Option<usize>, Standing)>> = assembly
-        .instances
-        .iter()
-        .enumerate()
-        .map(|(i, instance)| match solids.get(instance.design) {
-            Some(solid) => members(assembly, i, instance, solid),
-            None => Vec::new(),
+/// Something that stands in the assembly: where it is declared, the clearance of its process (mm), and its members.
+struct Whole {
+    origin: Origin,
+    clearance_mm: f64,
+    members: Vec<Member>,
+}
+
+/// What something is called, the common body it is, and where it stands.
+type Member = (String, Option<usize>, Standing);
+
+/// Instances, and bodies of the assembly's own, that stand in each other's way in the rest pose, each pair once, at
+/// the worst place.
+fn in_the_way(assembly: &Assembly, solids: &[Solid], frames: &[Frame]) -> Vec<Diagnostic> {
+    let clearance = |design: usize| assembly.designs.get(design).map_or(0.0, |d| d.process.clearance_mm);
+    let instances = assembly.instances.iter().enumerate().map(|(i, instance)| Whole {
+        origin: instance.origin,
+        clearance_mm: clearance(instance.design),
+        members: solids.get(instance.design).map_or(Vec::new(), |s| members(assembly, i, instance, s)),
+    });
+    let own = frames.iter().filter_map(|f| {
+        let joined = assembly.joined.get(f.joined)?;
+        let first = joined.members.first().and_then(|(i, _)| assembly.instances.get(*i));
+        let standing = Standing::body(&f.plan, &Placement::IDENTITY);
+        Some(Whole {
+            origin: joined.origin,
+            clearance_mm: first.map_or(0.0, |i| clearance(i.design)),
+            members: vec![(joined.name.clone(), Some(f.joined), standing)],
         })
-        .collect();
+    });
+    let standing: Vec<Whole> = instances.chain(own).collect();
     let mut found = Vec::new();
     for (i, first) in standing.iter().enumerate() {
-        for (j, second) in standing.iter().enumerate().skip(i + 1) {
-            let (Some(one), Some(other)) = (assembly.instances.get(i), assembly.instances.get(j)) else {
-                continue;
-            };
-            let bound = assembly.designs.get(one.design).map_or(0.0, |d| d.process.clearance_mm);
-            let mut worst: Option<(f64, nalgebra::Vector3<f64>, &str, &str)> = None;
-            for (name, joined, a) in first {
-                for (also, joined_too, b) in second {
+        for second in standing.iter().skip(i + 1) {
+            let mut worst: Option<(f64, Vector3<f64>, &str, &str)> = None;
+            for (name, joined, a) in &first.members {
+                for (also, joined_too, b) in &second.members {
                     // What is one body is not in its own way.
                     if joined.is_some() && joined == joined_too {
                         continue;
                     }
-                    let bound = worst.map_or(bound, |w| w.0);
+                    let bound = worst.map_or(first.clearance_mm, |w| w.0);
                     if let Some((gap, at)) = a.gap(b, bound) {
                         worst = Some((gap, at, name, also));
                     }
                 }
             }
             if let Some((gap, at, a, b)) = worst {
-                found.push(told(gap, at, (a, one), (b, other), bound));
+                found.push(told(gap, at, (a, first.origin), (b, second.origin), first.clearance_mm));
             }
         }
     }
     found
 }
 
-/// Bodies and flexures of an instance: what each is called, the common body it is, and where it stands.
-fn members(
-    assembly: &Assembly,
-    index: usize,
-    instance: &Instance,
-    solid: &Solid,
-) -> Vec<(String, Option<usize>, Standing)> {
+/// Bodies and flexures of an instance.
+fn members(assembly: &Assembly, index: usize, instance: &Instance, solid: &Solid) -> Vec<Member> {
     let p = &instance.placement;
     let bodies = solid.input.bodies.iter().zip(&solid.parts.plans).enumerate();
     let bodies = bodies.map(|(b, (body, plan))| {
@@ -183,9 +228,9 @@ fn members(
 
 fn told(
     gap: f64,
-    at: nalgebra::Vector3<f64>,
-    (a, one): (&str, &Instance),
-    (b, other): (&str, &Instance),
+    at: Vector3<f64>,
+    (a, one): (&str, Origin),
+    (b, other): (&str, Origin),
     clearance: f64,
 ) -> Diagnostic {
     let place = format!("near ({:.1}, {:.1}, {:.1}) mm", at.x, at.y, at.z);
@@ -193,12 +238,12 @@ fn told(
         Diagnostic::error(
             "E0641",
             format!("`{a}` and `{b}` stand in each other's way in the rest pose"),
-            other.origin,
+            other,
         )
         .label(format!("they overlap by {:.2} mm {place}", -gap))
     } else {
-        Diagnostic::warning("W0642", format!("`{a}` and `{b}` are printed {gap:.2} mm apart"), other.origin)
+        Diagnostic::warning("W0642", format!("`{a}` and `{b}` are printed {gap:.2} mm apart"), other)
             .label(format!("{place}; the process needs {clearance:.2} mm"))
     };
-    d.also(one.origin, "the other one").help("move the instances apart, or give them the body in common")
+    d.also(one, "the other one").help("move the instances apart, or give them the body in common")
 }
