@@ -529,6 +529,51 @@ fn merged_grounds_that_coincide_are_one_sound_part() {
     common::accepted_by_others(&artefacts);
 }
 
+/// Two levers that do not touch, on a board with points of its own.
+fn board(points: &str) -> (Vec<(String, Mesh)>, Vec<String>) {
+    let text = TWINS
+        .replace("place big = lever at (0 mm, 90 mm)    scale = 1.5", "")
+        .replace("big.", "two.")
+        .replace("at (-20 mm, 20 mm)  turned 90 deg about z ", "at (0 mm, 0 mm, 40 mm)")
+        .replace("ground board { }", &format!("{points}\n"));
+    let a = assembly(&text);
+    let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
+    let (artefacts, found) = Compiler::default().parts(&a, &starts).unwrap();
+    (meshes(&artefacts), found.into_iter().map(|d| d.code).collect())
+}
+
+/// Bars through the assembly's own points join grounds that stand apart; without them there are two pieces.
+#[test]
+fn a_ground_with_points_joins_what_is_merged_into_it() {
+    let (pieces, found) = board("ground board { }");
+    assert_eq!((pieces.len(), found), (2, vec!["W0640".to_string()]));
+    let (parts, found) = board(
+        "point A = (-20 mm, 0 mm)
+        point B = (-20 mm, 0 mm, 40 mm)
+        ground board { A, B }",
+    );
+    assert_eq!(found, [""; 0]);
+    assert_eq!(parts.iter().map(|p| p.0.as_str()).collect::<Vec<_>>(), ["twins_board.stl"]);
+    assert!(check_mesh(&parts[0].1).is_printable());
+    let alone: f64 = pieces.iter().map(|p| p.1.volume_mm3()).sum();
+    assert!(parts[0].1.volume_mm3() > alone);
+    // Half-way there is nothing but the bar.
+    let wall = Probe::new(&parts[0].1).thickness_mm(&Vector3::new(-20.1, 0.05, 20.02), &Vector3::x());
+    assert!(wall.is_some_and(|w| w > 4.0), "{wall:?}");
+}
+
+/// What moves must keep clear of the bars too.
+#[test]
+fn bars_of_a_board_can_stand_in_the_way() {
+    let (_, found) = board(
+        "point A = (30 mm, 0 mm, -20 mm)
+        point B = (30 mm, 0 mm, 20 mm)
+        point C = (-20 mm, 0 mm, 0 mm)
+        ground board { A, B, C }",
+    );
+    assert!(found.contains(&"E0641".to_string()), "{found:?}");
+}
+
 /// Where a merged ground of another instance runs through a bore, the bore is cut again.
 #[test]
 fn a_bore_stays_open_in_a_merged_body() {

@@ -238,8 +238,8 @@ fn wires_between_bodies_of_nothing_else() {
     }
 }
 
-/// A crank drives a carriage on a slider; the wrist is a flexure one layer above.
-fn press() -> String {
+/// A crank drives a carriage on a slider of a layer; the wrist is a flexure one layer above the carriage.
+fn press(layer: i32) -> String {
     format!(
         "{HEAD}mechanism press {{
         point O = (0 mm, 0 mm)
@@ -253,7 +253,7 @@ fn press() -> String {
         hinge  motor: palm to crank    at O layer -1
         hinge  pin:   crank to rod     at A layer 0 pin 3 mm
         hinge  wrist: rod to carriage  at S layer 1 into carriage toward W as crossed_leaves {{ size = 28 mm }}
-        slider guide: palm to carriage at S axis x
+        slider guide: palm to carriage at S axis x layer {layer}
         cycle 24 steps over 2 s
         drive motor from 0 deg to 360 deg
         rest motor at 90 deg
@@ -262,9 +262,26 @@ fn press() -> String {
     )
 }
 
+/// The point at which a slider is drawn is no node of its bodies, in whatever layer the slider is: what ended there
+/// would stand in the bar's way.
+#[test]
+fn nothing_ends_where_a_slider_is_drawn() {
+    for layer in [-2, 0] {
+        let (_, _, input) = input(&press(layer), 24);
+        let s = Vector3::new(60.0, 0.0, 0.0);
+        let palm = plan_bodies(&input).unwrap().swap_remove(0);
+        let ends = palm.slots.iter().filter(|(r, _)| !matches!(r, Role::Guide(_)));
+        let nearest = ends.flat_map(|(_, t)| [t.start, t.end]).map(|p| (p - s).xy().norm());
+        let nearest = nearest.fold(f64::INFINITY, f64::min);
+        // The sleeve is held at its side.
+        let half = input.height_mm / 2.0;
+        assert!(nearest > half, "{nearest} mm from the middle of a sleeve {half} mm wide to each side");
+    }
+}
+
 #[test]
 fn a_bar_slides_in_its_sleeve() {
-    let (_, layout, input) = input(&press(), 24);
+    let (_, layout, input) = input(&press(0), 24);
     let (palm, carriage) = (0, 3);
     let guide = &input.bodies[palm].guides[0];
     assert!(guide.sleeve && !input.bodies[carriage].guides[0].sleeve);

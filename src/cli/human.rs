@@ -186,7 +186,7 @@ mod tests {
         Measures {
             traces: [("tip".to_string(), trace)].into(),
             drives: [("motor".to_string(), DriveMeasures::Torque { max_torque_n_mm: 41.5 })].into(),
-            stress: StressMeasures { max_mpa: Some(24.91) },
+            stress: StressMeasures { max_mpa: Some(24.91), place: None },
             ..Measures::default()
         }
     }

@@ -66,7 +66,7 @@ impl Parts {
             Some(group) => group.members.push(second),
             None => {
                 let members = first.into_iter().chain([second]).collect();
-                self.joined.push(Joined { name, members, origin: at });
+                self.joined.push(Joined { name, members, skeleton: Vec::new(), origin: at });
             }
         }
     }
@@ -116,6 +116,7 @@ impl<'a> Evaluator<'a> {
             }
         }
         self.mirrors(&sheet, &mut parts);
+        self.own_shapes(scope, &sheet, &mut parts);
         self.same_cycles(&parts);
         self.same_stuff(&parts);
         let requirements = queries
@@ -135,14 +136,14 @@ impl<'a> Evaluator<'a> {
         for s in &m.statements {
             let what = match &s.kind {
                 StatementKind::Body { ground: false, .. } => "link",
-                StatementKind::Body { points, layer, .. } if !points.is_empty() || layer.is_some() => {
+                StatementKind::Body { layer: Some(layer), .. } => {
                     self.out.push(
                         Diagnostic::error(
                             codes::LATER_STATEMENT,
-                            "a ground of its own shape beside instances is not available yet",
-                            s.at,
+                            "a ground beside instances in a layer is not available yet",
+                            layer.at,
                         )
-                        .help("write `ground NAME { }`: it is made of the grounds merged into it"),
+                        .help("it has no joints of its own: put its points at the height where they belong"),
                     );
                     continue;
                 }
@@ -172,6 +173,35 @@ impl<'a> Evaluator<'a> {
                 Diagnostic::error(codes::MISSING, "there is nothing to mirror", m.name.at)
                     .help("add for instance `place right = half at (0 mm, 0 mm)`"),
             );
+        }
+    }
+
+    /// The points of grounds of the assembly's own: what they reach beside what is merged into them.
+    fn own_shapes(&mut self, scope: usize, sheet: &Sheet<'a>, parts: &mut Parts) {
+        for text in sheet.bodies.iter().filter(|b| b.ground && !b.points.is_empty()) {
+            let Ok(body) = self.body(scope, text) else { continue };
+            let what = "a point of a ground beside instances";
+            let points = body.skeleton.iter().map(|p| {
+                let mut at = [0.0; 3];
+                for (slot, id) in at.iter_mut().zip(p.position) {
+                    *slot = self.fixed(id, text.at, what)?;
+                }
+                Ok(at)
+            });
+            let Ok(points) = points.collect::<Outcome<Vec<[f64; 3]>>>() else { continue };
+            match parts.joined.iter_mut().find(|j| j.name == body.name) {
+                Some(joined) => (joined.skeleton, joined.origin) = (points, text.at),
+                // A `place` that went wrong may have been the one.
+                None if !parts.failed.is_empty() => {}
+                None => self.out.push(
+                    Diagnostic::error(
+                        codes::MISSING,
+                        format!("nothing is merged into `{}`, so it is of no material", body.name),
+                        text.at,
+                    )
+                    .help(format!("write `place … merging GROUND into {}`", body.name)),
+                ),
+            }
         }
     }
 

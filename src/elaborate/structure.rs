@@ -92,7 +92,7 @@ impl<'a> Evaluator<'a> {
         s
     }
 
-    fn body(&mut self, scope: usize, text: &BodyText<'a>) -> Outcome<Body> {
+    pub(super) fn body(&mut self, scope: usize, text: &BodyText<'a>) -> Outcome<Body> {
         let mut skeleton: Vec<NamedPoint> = Vec::new();
         self.limit(text.points.len(), "points of a body", text.at)?;
         for name in text.points {

@@ -22,17 +22,20 @@ pub fn parts_input(design: &Design, layout: &Layout, model: &Model) -> PartsInpu
         .iter()
         .enumerate()
         .map(|(b, body)| {
-            let flexed = |p: &Vector3<f64>| {
+            let layers = layers(design, layout, b, &drawn);
+            // Flexures, sliders and, in space, eyes have nodes of their own. They are told by where they are drawn:
+            // later a joint stands in its layer, and a slider's bar where it is at rest.
+            let has_node = |j: &Joint| j.is_compliant() || j.kind == JointKind::Slider || layers.is_none();
+            let held = |p: &Vector3<f64>| {
                 design.joints.iter().any(|j| {
-                    j.is_compliant() && j.bodies.contains(&b) && (drawn(j.point) - p).norm() < SAME_POINT_MM
+                    has_node(j) && j.bodies.contains(&b) && (drawn(j.point) - p).norm() < SAME_POINT_MM
                 })
             };
-            let skeleton = body.skeleton.iter().map(|p| drawn(p.position)).filter(|p| !flexed(p));
+            let skeleton = body.skeleton.iter().map(|p| drawn(p.position)).filter(|p| !held(p));
             let eyes =
                 design.joints.iter().enumerate().filter(|(_, j)| {
                     !j.is_compliant() && j.kind == JointKind::Hinge && j.bodies.contains(&b)
                 });
-            let layers = layers(design, layout, b, &drawn);
             BodySolid {
                 name: body.name.clone(),
                 axis: layers.map(|(axis, _)| axis),

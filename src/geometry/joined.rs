@@ -8,7 +8,7 @@ use super::distance::separation;
 use super::gap::{Fusion, Member, fusions};
 use super::link::{BodyPlan, BoreCut, Role};
 use super::mesh::Mesh;
-use super::parts::{BodySolid, FlexureSolid, GeometryError, PartsInput, build_part, groups};
+use super::parts::{BodySolid, FlexureSolid, GeometryError, PartsInput, build_part, groups, plan_bodies};
 use super::slot::Slot;
 use crate::ir::Placement;
 use crate::math::Pose;
@@ -102,6 +102,48 @@ pub struct Whole {
     pub bodies: Vec<Vec<(usize, usize)>>,
     /// The instance of each flexure, with its index in it.
     pub flexures: Vec<(usize, usize)>,
+}
+
+/// A body of an assembly by itself, beside what is merged into it.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// The body alone.
+    pub input: PartsInput,
+    /// Its plan.
+    pub plans: Vec<BodyPlan>,
+    /// Nothing is carved.
+    pub carving: Carving,
+    /// It stands still.
+    pub state: MovedState,
+}
+
+impl Frame {
+    /// Round bars through points (mm), of the sizes that links of `like` have.
+    ///
+    /// # Errors
+    /// Points that are no places.
+    pub fn new(name: &str, points: &[Vector3<f64>], like: &PartsInput) -> Result<Self, GeometryError> {
+        let body = BodySolid { name: name.into(), skeleton: points.to_vec(), ..BodySolid::default() };
+        let input = PartsInput {
+            bodies: vec![body],
+            flexures: Vec::new(),
+            motion: Vec::new(),
+            height_mm: like.height_mm,
+            clearance_mm: like.clearance_mm,
+            least_wall_mm: like.least_wall_mm,
+            facets: like.facets,
+        };
+        let plans = plan_bodies(&input)?;
+        let state = MovedState { poses: vec![Pose::rest(Vector3::zeros())], flexures: Vec::new() };
+        Ok(Self { input, plans, carving: Carving::default(), state })
+    }
+
+    /// As body number `body` of a whole with so many states.
+    pub fn share(&self, body: usize, states: usize) -> Share<'_> {
+        let Self { input, plans, carving, state } = self;
+        let states = vec![state; states];
+        Share { input, plans, carving, states, placement: Placement::IDENTITY, bodies: vec![body] }
+    }
 }
 
 /// Puts instances together.

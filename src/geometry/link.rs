@@ -197,8 +197,7 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
     for guide in &body.guides {
         b.add_guide(guide, false)?;
     }
-    let guided = |p: &Vector3<f64>| body.guides.iter().any(|g| (g.point - p).norm() < SAME_NODE_MM);
-    for p in body.skeleton.iter().filter(|p| !guided(p) && !b.is_risen(p)).copied().collect::<Vec<_>>() {
+    for p in body.skeleton.iter().filter(|p| !b.is_risen(p)).copied().collect::<Vec<_>>() {
         b.node(p, None, Anchor::Fixed);
     }
     b.rise_beside();

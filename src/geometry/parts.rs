@@ -53,8 +53,8 @@ pub struct BodySolid {
     /// Height of the middle of the body's own layer, measured along its axis from the origin.
     pub level_mm: f64,
     /// Points the link must reach at its own level (their height along the axis is ignored): points listed for
-    /// the body and conventional joints. Points of compliant joints do not belong here: there the
-    /// link ends in stubs.
+    /// the body and conventional hinges. Points of compliant joints and of sliders do not belong here: there the
+    /// link ends in stubs and guides.
     pub skeleton: Vec<Vector3<f64>>,
     /// Conventional hinges.
     pub eyes: Vec<Eye>,

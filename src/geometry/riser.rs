@@ -50,8 +50,7 @@ impl Builder<'_> {
     fn nearer_than<'n>(&self, slot: &Slot, gap_mm: f64, near: impl IntoIterator<Item = &'n Near>) -> bool {
         let (center, radius) = slot.bounding_sphere();
         near.into_iter().any(|n| {
-            (n.center - center).norm() - n.radius - radius < gap_mm
-                && nearer_than(&n.slot, slot, gap_mm)
+            (n.center - center).norm() - n.radius - radius < gap_mm && nearer_than(&n.slot, slot, gap_mm)
         })
     }
 

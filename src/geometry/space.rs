@@ -41,8 +41,7 @@ impl Builder<'_> {
         for guide in &body.guides {
             self.add_guide(guide, true)?;
         }
-        let joints = || body.eyes.iter().map(|e| e.point).chain(body.guides.iter().map(|g| g.point));
-        let apart = |p: &Vector3<f64>| joints().all(|q| (q - p).norm() >= SAME_NODE_MM);
+        let apart = |p: &Vector3<f64>| body.eyes.iter().all(|e| (e.point - p).norm() >= SAME_NODE_MM);
         for p in body.skeleton.iter().filter(|p| apart(p)) {
             self.node_in_space(*p, Anchor::Fixed);
         }

@@ -71,6 +71,9 @@ pub struct Joined {
     pub name: String,
     /// Instance and body.
     pub members: Vec<(usize, BodyId)>,
+    /// What the body itself reaches in the assembly, mm: joined by bars, beside the members' own shapes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub skeleton: Vec<[f64; 3]>,
     /// The first statement that joins them.
     pub origin: Origin,
 }

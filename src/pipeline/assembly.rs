@@ -2,7 +2,7 @@
 
 use super::aims::AimSeries;
 use super::measure::{check_requirement, check_requirements, is_closed, measure};
-use super::report::{Measures, RequirementResult};
+use super::report::{Measures, Place, RequirementResult, Worst};
 use super::stages::{Between, Simulation};
 use crate::diagnostic::Diagnostic;
 use crate::emit::csv::{MotionState, MotionTable};
@@ -60,11 +60,23 @@ fn placed_simulation(instance: &Instance, design: &Design, simulation: &Simulati
         },
         errors_mm: simulation.errors_mm.iter().map(|e| series(e)).collect(),
         gaps_mm: series(&simulation.gaps_mm),
+        worst: placed_worst(instance, &simulation.worst),
         aims,
         // What a motor in common would do released is not known from one half.
         stability: if instance.name.is_empty() { simulation.stability.clone() } else { Default::default() },
         diagnostics: Vec::new(),
     }
+}
+
+/// Names and states as the assembly has them.
+fn placed_worst(instance: &Instance, worst: &Worst) -> Worst {
+    let placed = |w: &Option<(f64, Place)>| {
+        w.as_ref().map(|(value, p)| {
+            let state = instance.states.iter().position(|s| *s == p.state).unwrap_or(p.state);
+            (*value, Place { of: p.of.iter().map(|n| instance.of(n)).collect(), state })
+        })
+    };
+    Worst { stress: placed(&worst.stress), gap: placed(&worst.gap) }
 }
 
 /// `output.curl_deg` of `index` is `output.index.curl_deg`.
@@ -168,9 +180,11 @@ pub fn combine(assembly: &Assembly, placed: Vec<Simulation>, between: &Between) 
             sum.load_potential_n_mm += s.load_potential_n_mm;
             sum.stress_max_mpa = sum.stress_max_mpa.max(s.stress_max_mpa);
         }
+        out.worst.take(&p.worst);
         nearer(&mut out.gaps_mm, &p.gaps_mm);
     }
     nearer(&mut out.gaps_mm, &between.gaps_mm);
+    out.worst.take(&between.worst);
     out
 }
 
@@ -189,6 +203,7 @@ fn kept<T: Clone>(values: &[T], which: &[bool]) -> Vec<T> {
 /// Measures by instance (`right.wheel`), a motor in common once, stress and gap of all.
 pub fn measure_all(assembly: &Assembly, placed: &[Simulation], between: &Between) -> Measures {
     let mut all = Measures::default();
+    let mut worst = Worst::default();
     for (i, ((instance, design), simulation)) in assembly.placed().zip(placed).enumerate() {
         let own = measure(design, simulation);
         all.directions.extend(own.directions.into_iter().map(|(n, d)| (instance.of(&n), d)));
@@ -204,9 +219,13 @@ pub fn measure_all(assembly: &Assembly, placed: &[Simulation], between: &Between
         }
         all.stress.max_mpa = more(all.stress.max_mpa, own.stress.max_mpa, f64::max);
         all.gap.least_mm = more(all.gap.least_mm, own.gap.least_mm, f64::min);
+        worst.take(&simulation.worst);
     }
+    worst.take(&between.worst);
     all.gap.least_mm =
         between.gaps_mm.iter().fold(all.gap.least_mm, |least, g| more(least, Some(*g), f64::min));
+    all.stress.place = worst.stress.map(|w| w.1);
+    all.gap.place = worst.gap.map(|w| w.1);
     all
 }
 

@@ -4,7 +4,7 @@
 use super::aims::AimSeries;
 use super::joined::{self, Solid};
 use super::progress::Iteration;
-use super::report::Artefact;
+use super::report::{Artefact, Place, Worst};
 use super::solids;
 use super::stability;
 use super::stages::{Between, Checked, Failed, Simulation, Solved, Stages};
@@ -113,7 +113,9 @@ impl Stages for Compiler {
         let gaps_mm = gaps.least.iter().filter_map(|g| g.map(|g| g.gap_mm)).collect();
         let aims = AimSeries::compliant(design, &layout, &motion, &cycle);
         let motion = MotionTable { more: aims.columns(design), ..table(design, true, states.collect()) };
-        Ok(Simulation { motion, errors_mm, aims, gaps_mm, stability, diagnostics })
+        let worst =
+            Worst { stress: most_stressed(design, &model, &cycle), gap: solids::nearest(design, &gaps) };
+        Ok(Simulation { motion, errors_mm, aims, gaps_mm, worst, stability, diagnostics })
     }
 
     fn between(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Between {
@@ -330,6 +332,18 @@ fn lost(design: &Design, error: &SweepError) -> Failed {
     vec![Diagnostic::error("E0602", message, at).label(format!("last equilibrium at {values}")).help(
         "the flexures are asked for more than they can do there: lengthen them, or rest nearer to this value",
     )]
+}
+
+/// The largest von Mises stress over the cycle (MPa), the rod and the state.
+fn most_stressed(design: &Design, model: &Model, cycle: &Cycle) -> Option<(f64, Place)> {
+    let all = cycle.states.iter().enumerate().flat_map(|(s, e)| {
+        let rods = model.rods.iter().zip(&e.strains).zip(&design.rods);
+        rods.filter_map(move |((rod, strains), told)| {
+            let stress = rod.rod.largest_stress(strains)?.von_mises_mpa;
+            Some((stress, Place { of: vec![told.path.clone()], state: s }))
+        })
+    });
+    all.max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 /// Strings that would have to push.

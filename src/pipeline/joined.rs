@@ -1,13 +1,15 @@
 //! The printed parts of an assembly: those of its designs, in the places of their instances.
 
+use super::report::{Place, Worst};
 use super::stages::{Between, Failed};
 use crate::diagnostic::{Diagnostic, Origin};
-use crate::geometry::joined::{Share, Whole, join};
+use crate::geometry::joined::{Frame, Share, Whole, join};
 use crate::geometry::link::BodyPlan;
 use crate::geometry::{
     Carving, Fusion, GeometryError, LeastGap, Member, Mesh, MovedState, Part, Parts, PartsInput,
     carved_cycle_gaps,
 };
+use crate::ir::assembly::Joined;
 use crate::ir::{Assembly, Instance};
 use nalgebra::Vector3;
 
@@ -107,7 +109,8 @@ pub fn parts(assembly: &Assembly, solids: &[Solid]) -> Result<(Vec<Printed>, Vec
     Ok((out, found))
 }
 
-/// The instances as one mechanism, from what is known of each design.
+/// The instances as one mechanism, from what is known of each design. Bodies of the assembly with points of their own
+/// follow the instances, each as a share that stands still ([`own`]).
 fn joined(assembly: &Assembly, designs: &[Known<'_>]) -> Result<Whole, GeometryError> {
     let mut known: Vec<(usize, usize)> = Vec::new();
     let mut count = 0;
@@ -128,7 +131,23 @@ fn joined(assembly: &Assembly, designs: &[Known<'_>]) -> Result<Whole, GeometryE
         let states = (0..states.len()).filter_map(|s| states.get(instance.state(s))).collect();
         shares.push(Share { input, plans, carving, states, placement: instance.placement, bodies });
     }
+    let states = shares.iter().map(|s| s.states.len()).min().unwrap_or(0);
+    let mut frames = Vec::new();
+    for joined in own(assembly) {
+        let first = joined.members.first().and_then(|(i, _)| assembly.instances.get(*i));
+        let like = first.and_then(|i| designs.get(i.design));
+        let body = known.iter().find(|k| assembly.joined.get(k.0) == Some(joined)).map(|k| k.1);
+        let (Some(like), Some(body)) = (like, body) else { continue };
+        let points: Vec<Vector3<f64>> = joined.skeleton.iter().map(|p| Vector3::from(*p)).collect();
+        frames.push((Frame::new(&joined.name, &points, like.input)?, body));
+    }
+    shares.extend(frames.iter().map(|(frame, body)| frame.share(*body, states)));
     join(&shares)
+}
+
+/// The bodies of the assembly that have points of their own, in the order of their shares after the instances'.
+fn own(assembly: &Assembly) -> impl Iterator<Item = &Joined> {
+    assembly.joined.iter().filter(|j| !j.skeleton.is_empty() && !j.members.is_empty())
 }
 
 /// The group of common bodies that a body belongs to.
@@ -139,7 +158,8 @@ fn joint_body(assembly: &Assembly, instance: usize, body: usize) -> Option<usize
 /// Whether a part of a design is printed by itself in an instance: none of its bodies belongs to another one too.
 pub fn stands_alone(assembly: &Assembly, design: usize, bodies: &[usize]) -> bool {
     let common = |i: usize, b: usize| {
-        joint_body(assembly, i, b).and_then(|j| assembly.joined.get(j)).is_some_and(|j| j.members.len() > 1)
+        let joined = joint_body(assembly, i, b).and_then(|j| assembly.joined.get(j));
+        joined.is_some_and(|j| j.members.len() > 1 || !j.skeleton.is_empty())
     };
     let of_design = |(_, n): &(usize, &Instance)| n.design == design;
     let mut instances = assembly.instances.iter().enumerate().filter(of_design);
@@ -171,21 +191,28 @@ fn name(assembly: &Assembly, solids: &[Solid], whole: &Whole, group: &[usize]) -
     Some((format!("{}_{}_{}", assembly.name, instance.name, body.name), instance.origin))
 }
 
-/// Two instances that meet, and how a member of each is called there.
-struct Meeting<'a> {
-    one: (&'a Instance, String),
-    other: (&'a Instance, String),
+/// Two instances that meet.
+struct Meeting {
+    one: Side,
+    other: Side,
     /// Indices of the two.
     pair: (usize, usize),
 }
 
+/// What declares one of them, how a member of it is called, and the clearance of its process (mm).
+struct Side {
+    at: Origin,
+    name: String,
+    clearance_mm: f64,
+}
+
 /// Between which instances something is; none: it is within one, where `told` knows of it.
-fn meeting<'a>(
-    assembly: &'a Assembly,
+fn meeting(
+    assembly: &Assembly,
     whole: &Whole,
     (a, b): (Member, Member),
     told: impl Fn(usize, Member, Member) -> bool,
-) -> Option<Meeting<'a>> {
+) -> Option<Meeting> {
     let (first, second) = (whole.owners(a), whole.owners(b));
     let within = first.iter().find(|i| second.contains(i));
     let (i, j) = match within {
@@ -194,21 +221,32 @@ fn meeting<'a>(
             if told(*i, whole.within(*i, a)?, whole.within(*i, b)?) {
                 return None;
             }
-            // A common body: what another instance has of it is in the way.
-            let other = |of: &[usize]| of.iter().copied().find(|k| k != i);
+            // A common body: what another instance has of it is in the way, or the assembly itself, which stands last.
+            let other = |of: &[usize]| of.iter().rev().copied().find(|k| k != i);
             other(&second).map(|j| (*i, j)).or_else(|| other(&first).map(|j| (j, *i)))?
         }
     };
-    let called = |i: usize, m: Member| {
-        let instance = assembly.instances.get(i)?;
-        let design = assembly.designs.get(instance.design)?;
-        let name = match whole.within(i, m)? {
-            Member::Body(b) => &design.bodies.get(b)?.name,
-            Member::Flexure(f) => &design.rods.get(f)?.path,
-        };
-        Some((instance, instance.of(name)))
+    Some(Meeting {
+        one: side(assembly, whole, i, a)?,
+        other: side(assembly, whole, j, b)?,
+        pair: (i.min(j), i.max(j)),
+    })
+}
+
+/// A member as it stands in an instance, or in the assembly's own bodies after them.
+fn side(assembly: &Assembly, whole: &Whole, i: usize, member: Member) -> Option<Side> {
+    let clearance = |n: &Instance| assembly.designs.get(n.design).map_or(0.0, |d| d.process.clearance_mm);
+    let Some(instance) = assembly.instances.get(i) else {
+        let joined = own(assembly).nth(i - assembly.instances.len())?;
+        let first = joined.members.first().and_then(|(i, _)| assembly.instances.get(*i))?;
+        return Some(Side { at: joined.origin, name: joined.name.clone(), clearance_mm: clearance(first) });
     };
-    Some(Meeting { one: called(i, a)?, other: called(j, b)?, pair: (i.min(j), i.max(j)) })
+    let design = assembly.designs.get(instance.design)?;
+    let name = match whole.within(i, member)? {
+        Member::Body(b) => &design.bodies.get(b)?.name,
+        Member::Flexure(f) => &design.rods.get(f)?.path,
+    };
+    Some(Side { at: instance.origin, name: instance.of(name), clearance_mm: clearance(instance) })
 }
 
 /// Instances that stand in each other's way in the rest pose, each pair once, at the worst place.
@@ -217,7 +255,7 @@ fn in_the_way(assembly: &Assembly, solids: &[Solid], whole: &Whole) -> Vec<Diagn
         let solid = assembly.instances.get(i).and_then(|n| solids.get(n.design));
         solid.is_some_and(|s| s.parts.fusions.iter().any(|f| (f.a, f.b) == (a, b) || (f.b, f.a) == (a, b)))
     };
-    let mut worst: Vec<(Fusion, Meeting<'_>)> = Vec::new();
+    let mut worst: Vec<(Fusion, Meeting)> = Vec::new();
     for fusion in whole.fusions() {
         let Some(meeting) = meeting(assembly, whole, (fusion.a, fusion.b), known) else { continue };
         match worst.iter_mut().find(|w| w.1.pair == meeting.pair) {
@@ -227,26 +265,27 @@ fn in_the_way(assembly: &Assembly, solids: &[Solid], whole: &Whole) -> Vec<Diagn
         }
     }
     worst.sort_by_key(|w| w.1.pair);
-    let clearance = |n: &Instance| assembly.designs.get(n.design).map_or(0.0, |d| d.process.clearance_mm);
-    worst.iter().map(|(f, m)| told(f, m, clearance(m.one.0))).collect()
+    worst.iter().map(|(f, m)| told(f, m)).collect()
 }
 
-fn told(fusion: &Fusion, meeting: &Meeting<'_>, clearance: f64) -> Diagnostic {
-    let ((one, a), (other, b)) = (&meeting.one, &meeting.other);
+fn told(fusion: &Fusion, meeting: &Meeting) -> Diagnostic {
+    let Meeting {
+        one: Side { at: one, name: a, clearance_mm }, other: Side { at: other, name: b, .. }, ..
+    } = meeting;
     let place = near(&fusion.at);
     let d = if fusion.depth_mm > 0.0 {
         Diagnostic::error(
             "E0641",
             format!("`{a}` and `{b}` stand in each other's way in the rest pose"),
-            other.origin,
+            *other,
         )
         .label(format!("they overlap by {:.2} mm {place}", fusion.depth_mm))
     } else {
         let gap = -fusion.depth_mm;
-        Diagnostic::warning("W0642", format!("`{a}` and `{b}` are printed {gap:.2} mm apart"), other.origin)
-            .label(format!("{place}; the process needs {clearance:.2} mm"))
+        Diagnostic::warning("W0642", format!("`{a}` and `{b}` are printed {gap:.2} mm apart"), *other)
+            .label(format!("{place}; the process needs {clearance_mm:.2} mm"))
     };
-    d.also(one.origin, "the other one").help("move the instances apart, or give them the body in common")
+    d.also(*one, "the other one").help("move the instances apart, or give them the body in common")
 }
 
 fn near(p: &Vector3<f64>) -> String {
@@ -285,25 +324,31 @@ pub fn between(assembly: &Assembly, designs: &[Planned]) -> Between {
         !own.overlaps.is_empty()
     };
     let told = |o: &LeastGap| Some(collision(o, &meeting(assembly, &whole, (o.a, o.b), known)?));
+    let least = gaps.least.iter().flatten().min_by(|a, b| a.gap_mm.total_cmp(&b.gap_mm));
+    let nearest = least.and_then(|l| {
+        let called = |m: Member| Some(side(assembly, &whole, *whole.owners(m).first()?, m)?.name);
+        Some((l.gap_mm, Place { of: vec![called(l.a)?, called(l.b)?], state: l.state }))
+    });
     Between {
+        worst: Worst { gap: nearest, ..Worst::default() },
         gaps_mm: gaps.least.iter().filter_map(|g| g.map(|g| g.gap_mm)).collect(),
         diagnostics: gaps.overlaps.iter().filter_map(told).collect(),
     }
 }
 
-fn collision(worst: &LeastGap, meeting: &Meeting<'_>) -> Diagnostic {
-    let ((one, a), (other, b)) = (&meeting.one, &meeting.other);
+fn collision(worst: &LeastGap, meeting: &Meeting) -> Diagnostic {
+    let Meeting { one: Side { at: one, name: a, .. }, other: Side { at: other, name: b, .. }, .. } = meeting;
     let (code, message) = match (worst.a, worst.b) {
         (Member::Body(_), Member::Body(_)) => ("W0635", format!("`{a}` and `{b}` collide on the way")),
         _ => ("W0636", format!("`{b}` rubs against `{a}` on the way")),
     };
-    Diagnostic::warning(code, message, other.origin)
+    Diagnostic::warning(code, message, *other)
         .label(format!(
             "at state {} they overlap by {:.2} mm {}",
             worst.state,
             -worst.gap_mm,
             near(&worst.at)
         ))
-        .also(one.origin, "the other one")
+        .also(*one, "the other one")
         .help("move the instances apart, or narrow what they drive")
 }

@@ -1,6 +1,8 @@
 //! From a simulated cycle to the numbers people ask for: errors, extremes, requirements.
 
-use super::report::{DriveMeasures, GapMeasures, Measures, RequirementResult, StressMeasures, TraceMeasures};
+use super::report::{
+    DriveMeasures, GapMeasures, Measures, Place, RequirementResult, StressMeasures, TraceMeasures,
+};
 use super::stages::Simulation;
 use crate::diagnostic::Diagnostic;
 use crate::ir::{Aggregate, Design, DriveUnit, Quantity, Requirement};
@@ -39,9 +41,13 @@ pub fn measure(design: &Design, simulation: &Simulation) -> Measures {
     }
     let stress = series(simulation, &Quantity::Stress);
     let max_mpa = if design.rods.is_empty() { None } else { aggregate(&stress, Aggregate::Max, closed) };
-    measures.stress = StressMeasures { max_mpa };
+    measures.stress =
+        StressMeasures { max_mpa, place: simulation.worst.stress.as_ref().map(|w| w.1.clone()) };
     measures.stability = simulation.stability.clone();
-    measures.gap = GapMeasures { least_mm: aggregate(&simulation.gaps_mm, Aggregate::Min, closed) };
+    measures.gap = GapMeasures {
+        least_mm: aggregate(&simulation.gaps_mm, Aggregate::Min, closed),
+        place: simulation.worst.gap.as_ref().map(|w| w.1.clone()),
+    };
     measures
 }
 
@@ -80,7 +86,9 @@ pub(super) fn check_requirement(
         let label = match value {
             Some(v) => {
                 let (v, bound) = (shown(v), shown(bound));
-                format!("measured {v:.4} {unit}, required {} {bound:.4} {unit}", sign(requirement))
+                let at =
+                    worst_place(requirement, simulation).map_or(String::new(), |p| format!(" {}", p.told()));
+                format!("measured {v:.4} {unit}{at}, required {} {bound:.4} {unit}", sign(requirement))
             }
             None => "could not be measured".into(),
         };
@@ -94,6 +102,16 @@ pub(super) fn check_requirement(
         bound: shown(bound),
         pass,
     }
+}
+
+/// Where what is required is at its worst, if that is known.
+fn worst_place<'s>(requirement: &Requirement, simulation: &'s Simulation) -> Option<&'s Place> {
+    let worst = match (&requirement.quantity, requirement.aggregate) {
+        (Quantity::Stress, Aggregate::Max) => simulation.worst.stress.as_ref(),
+        (Quantity::Gap, Aggregate::Min) => simulation.worst.gap.as_ref(),
+        _ => None,
+    };
+    worst.map(|w| &w.1)
 }
 
 fn sign(requirement: &Requirement) -> &'static str {

@@ -17,8 +17,8 @@ pub use compiler::{Compiler, EDGES};
 pub use measure::{aggregate, check_requirements, is_closed, measure};
 pub use progress::{Iteration, Progress, Stage};
 pub use report::{
-    Artefact, BuildOutcome, DriveMeasures, GapMeasures, Measures, Origin, RequirementResult, Seconds,
-    StressMeasures, TraceMeasures,
+    Artefact, BuildOutcome, DriveMeasures, GapMeasures, Measures, Origin, Place, RequirementResult, Seconds,
+    StressMeasures, TraceMeasures, Worst,
 };
 pub use stability::{DriveValues, LimitPoint, RestState, SnapThrough, Stability};
 pub use stages::{Between, Checked, Failed, Simulation, Solved, Stages};

@@ -70,6 +70,9 @@ impl DriveMeasures {
 pub struct StressMeasures {
     /// True largest von Mises stress, MPa; none without rods.
     pub max_mpa: Option<f64>,
+    /// The rod, and when.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub place: Option<Place>,
 }
 
 /// Distance of the printed solids over the cycle: bodies and flexures, without what is joined by construction.
@@ -77,6 +80,51 @@ pub struct StressMeasures {
 pub struct GapMeasures {
     /// Least distance, mm, negative where two overlap; none where there is nothing to compare.
     pub least_mm: Option<f64>,
+    /// Between which two, and when.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub place: Option<Place>,
+}
+
+/// Where something is at its worst.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Place {
+    /// Bodies and flexures.
+    pub of: Vec<String>,
+    /// Index of the state.
+    pub state: usize,
+}
+
+/// Where a cycle is at its worst, with the value there.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Worst {
+    /// Largest von Mises stress, MPa.
+    pub stress: Option<(f64, Place)>,
+    /// Least gap, mm.
+    pub gap: Option<(f64, Place)>,
+}
+
+impl Worst {
+    /// Takes what is worse in another one.
+    pub fn take(&mut self, other: &Self) {
+        let worse = |own: &mut Option<(f64, Place)>, other: &Option<(f64, Place)>, sign: f64| {
+            if let Some(o) = other
+                && own.as_ref().is_none_or(|w| sign * o.0 > sign * w.0)
+            {
+                *own = Some(o.clone());
+            }
+        };
+        worse(&mut self.stress, &other.stress, 1.0);
+        worse(&mut self.gap, &other.gap, -1.0);
+    }
+}
+
+impl Place {
+    /// In words.
+    pub fn told(&self) -> String {
+        let names: Vec<String> = self.of.iter().map(|n| format!("`{n}`")).collect();
+        let where_ = if names.len() > 1 { "between" } else { "in" };
+        format!("{where_} {} at state {}", names.join(" and "), self.state)
+    }
 }
 
 /// Wall-clock time a stage, s.

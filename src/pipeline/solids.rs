@@ -1,6 +1,7 @@
 //! The geometry stage as the pipeline uses it: what can be printed, and its findings as diagnostics.
 
 use super::joined::Planned;
+use super::report::Place;
 use super::stages::Failed;
 use crate::diagnostic::Diagnostic;
 use crate::equilibrium::{Cycle, Layout, Model};
@@ -97,6 +98,16 @@ pub fn planned(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -
     let states = states(design, layout, model, cycle);
     let carving = carve(&input, &plans, &states).ok()?;
     Some(Planned { input, plans, carving, states })
+}
+
+/// The nearest two over the whole cycle, with their gap (mm).
+pub fn nearest(design: &Design, gaps: &CycleGaps) -> Option<(f64, Place)> {
+    let least = gaps.least.iter().flatten().min_by(|a, b| a.gap_mm.total_cmp(&b.gap_mm))?;
+    let of = [least.a, least.b].map(|m| match m {
+        Member::Body(b) => design.bodies.get(b).map_or(String::new(), |b| b.name.clone()),
+        Member::Flexure(r) => design.rods.get(r).map_or(String::new(), |r| r.path.clone()),
+    });
+    Some((least.gap_mm, Place { of: of.to_vec(), state: least.state }))
 }
 
 /// Links that could not make way for their own flexures, each at the flexure's joint.

@@ -3,7 +3,7 @@
 
 use super::aims::AimSeries;
 use super::progress::Iteration;
-use super::report::Artefact;
+use super::report::{Artefact, Worst};
 use super::stability::Stability;
 use crate::diagnostic::{Diagnostic, SourceMap};
 use crate::elaborate::Files;
@@ -36,6 +36,8 @@ pub struct Simulation {
     pub aims: AimSeries,
     /// Least gap of the printed solids at every state, mm; empty where there is nothing to compare.
     pub gaps_mm: Vec<f64>,
+    /// Where the largest stress and the least gap are.
+    pub worst: Worst,
     /// What the released mechanism does.
     pub stability: Stability,
     /// Findings that do not stop the work.
@@ -47,6 +49,8 @@ pub struct Simulation {
 pub struct Between {
     /// Least gap of the printed solids of two instances at every state, mm; empty where there is nothing to compare.
     pub gaps_mm: Vec<f64>,
+    /// The least of them all.
+    pub worst: Worst,
     /// Where they meet.
     pub diagnostics: Vec<Diagnostic>,
 }
