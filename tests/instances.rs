@@ -384,7 +384,7 @@ fn the_gap_between_instances_is_measured_in_every_state() {
     /// The disc is measured on its facets, which stand back from a circle of 4.6 mm by up to 0.006 mm, on both sides.
     const FACETS_MM: f64 = 0.015;
     // The arm stands beside the plane and swings to it.
-    let head = TWINS.split_once("mechanism twins").unwrap().0;
+    let head = TWINS.split_once("mechanism twins").unwrap().0.replace("= 40 mm", "= 80 mm");
     let pair = |x: f64| {
         format!(
             "{head}mechanism pair {{\n place right = lever at ({x} mm, 0 mm) turned 90 deg about z\n \
@@ -392,7 +392,7 @@ fn the_gap_between_instances_is_measured_in_every_state() {
              require min(gap()) >= 0.3 mm\n}}\n"
         )
     };
-    let text = pair(12.0);
+    let text = pair(18.0);
     let a = assembly(&text);
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
     let between = Compiler::default().between(&a, &starts);
@@ -402,7 +402,7 @@ fn the_gap_between_instances_is_measured_in_every_state() {
     assert_eq!((between.gaps_mm.len(), tips.len()), (5, 5));
     // The disc ends the half as it was drawn, with the arm along x.
     let (half, _) = Compiler::default().mesh(&a.designs[0], &starts[0]).unwrap();
-    let radius = check_mesh(&meshes(&half)[0].1).largest.x - 40.0;
+    let radius = check_mesh(&meshes(&half)[0].1).largest.x - 80.0;
     assert!(tips[4] < tips[0] - 5.0, "{tips:?}");
     // Before, the stubs of the leaves are nearer.
     for (gap, tip) in between.gaps_mm.iter().zip(&tips).skip(2) {
@@ -411,7 +411,7 @@ fn the_gap_between_instances_is_measured_in_every_state() {
     // Nearer they collide on the way, which neither of them can know, and nothing is in the way at rest.
     let stages =
         Counted { compiler: Compiler { iterations: 0, ..Compiler::default() }, ..Counted::default() };
-    let out = build(&pair(8.0), &stages, None);
+    let out = build(&pair(14.0), &stages, None);
     let codes: Vec<&str> = out.diagnostics.iter().map(|d| d.code.as_str()).collect();
     assert!(codes.contains(&"W0635") && codes.contains(&"E0801") && !codes.contains(&"E0641"), "{codes:?}");
     let gaps: Vec<(bool, bool)> = out
