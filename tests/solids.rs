@@ -107,6 +107,58 @@ fn hinges_that_point_different_ways() {
     }
 }
 
+/// A rod on a gimbal; `base` and `plate` are further points of the two bodies.
+fn gimbal(base: &str, plate: &str) -> String {
+    format!(
+        "use std.materials.rigur\nuse std.processes.polyjet\nuse std.flexures.universal_leaves
+        mechanism gimbal {{
+        point C = (0 mm, 0 mm, 0 mm)
+        point M = (0 mm, 0 mm, -45 mm)
+        point Q = (0 mm, 0 mm, 45 mm)
+        point F = (0 mm, 0 mm, -25 mm)
+        point G = (0 mm, 0 mm, 25 mm)
+        ground base  {{ C, {base} M }}
+        link   plate {{ C, {plate} Q }}
+        universal cross: base to plate at C axis y and x into plate toward Q into base toward M as universal_leaves
+        load 0.1 N * t along (1, 0, 0) on plate at Q
+        cycle in 2 steps
+        trace tip = Q on plate
+        {TAIL}"
+    )
+}
+
+/// The ring of a gimbal goes between two forks: it is as small as the ends it joins, and the forks go round it, through
+/// points of their own where they have any.
+#[test]
+fn a_ring_between_two_forks() {
+    // Without the points the forks' legs meet in a hub, with them at the points, though straight across is shorter.
+    for (base, plate) in [("", ""), ("F,", "G,")] {
+        let text = gimbal(base, plate);
+        let (design, layout, input) = input(&text, 2);
+        let parts = build_parts(&input).unwrap();
+        // The ring's bar beside its own strips is carved later.
+        let bodies = |m: Member| matches!(m, Member::Body(_));
+        let fused = parts.fusions.iter().find(|f| bodies(f.a) && bodies(f.b));
+        assert_eq!(fused, None, "{text}");
+        let body = |name: &str| design.bodies.iter().position(|b| b.name == name).unwrap();
+        let ring = body("cross.ring");
+        let pose = |b: usize| &layout.rest_poses[b];
+        for other in [body("base"), body("plate")] {
+            let gap = gap(&parts.plans[ring], pose(ring), &parts.plans[other], pose(other));
+            assert!(gap > input.clearance_mm, "{gap}");
+        }
+        // From the attachment planes outwards: a little more than the ball itself.
+        let z = |p: &Vector3<f64>| p.z.abs();
+        let plane = input.flexures.iter().flat_map(|f| &f.centreline).map(z).fold(0.0, f64::max);
+        let ball =
+            |(role, slot): &(Role, Slot)| (*role == Role::Boss).then(|| (z(&slot.start), slot.radius_mm()));
+        for (at, radius) in parts.plans[ring].slots.iter().filter_map(ball) {
+            let room = at - radius - plane;
+            assert!(room > 0.0 && room < 0.5, "{room}");
+        }
+    }
+}
+
 fn gap(a: &BodyPlan, pa: &Pose, b: &BodyPlan, pb: &Pose) -> f64 {
     let slots =
         |plan: &BodyPlan, pose: &Pose| plan.slots.iter().map(|(_, s)| s.moved(pose)).collect::<Vec<_>>();

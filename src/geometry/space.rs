@@ -2,11 +2,11 @@
 //! chain or hub as in a layer (paper, section 3.3: a link is a union of capsules).
 
 use super::anchor::{Anchor, FlexureEnd, Follow, SizeBy};
-use super::distance::separation;
+use super::distance::{nearer_than, separation};
 use super::link::{
     BAR_BELOW_MM, BOSS_BELOW_MM, BOSS_EXTRA_MM, Builder, CLEAR_MM, LEAST_HALF_MM, Node, ROUND_MM, Role,
     SAME_NODE_MM, SPREAD_MM, STUB_BELOW_MM, STUB_FREE_MM, STUB_OVER_MM, STUB_RADIUS_MM, STUB_ROUND_MM,
-    spread,
+    plan_body, spread,
 };
 use super::parts::{BodySolid, Eye, FlexureSolid, GeometryError};
 use super::skeleton::connect;
@@ -20,8 +20,16 @@ const ROUND_PER_HEIGHT: f64 = 0.25;
 const NECK_DIRECTIONS: usize = 24;
 /// What a neck that runs into something costs beyond its way, mm.
 const BLOCKED_MM: f64 = 1e4;
+/// Length of a stub in front of its ball in a body that only joins flexures, mm: the ball just stays behind the
+/// attachment plane.
+const HELD_FREE_MM: f64 = 0.3;
 /// Leaves whose wide directions differ by less (sine) share sub-layers.
 const STACKED: f64 = 0.1;
+
+/// Whether flexures alone hold a body: a template's own.
+fn held(body: &BodySolid) -> bool {
+    body.skeleton.is_empty() && body.eyes.is_empty() && body.guides.is_empty()
+}
 
 impl Builder<'_> {
     /// Plans a body in space.
@@ -73,6 +81,24 @@ impl Builder<'_> {
         Ok(())
     }
 
+    /// Length of a stub in front of its ball. A held body has nothing to keep away from its flexures, and moves between
+    /// its neighbours: the smaller the better.
+    fn stub_free(&self) -> f64 {
+        if self.input.bodies.get(self.index).is_some_and(held) { HELD_FREE_MM } else { STUB_FREE_MM }
+    }
+
+    /// What held bodies are made of: they stand first, and the other bodies' bars go round them.
+    fn held_slots(&self) -> &[Slot] {
+        self.held.get_or_init(|| {
+            let bodies = &self.input.bodies;
+            if bodies.get(self.index).is_none_or(held) {
+                return Vec::new();
+            }
+            let plans = (0..bodies.len()).filter(|b| held(&bodies[*b])).map(|b| plan_body(self.input, b));
+            plans.flatten().flat_map(|plan| plan.slots).map(|(_, slot)| slot).collect()
+        })
+    }
+
     /// Radius of a round bar.
     fn round_radius(&self) -> f64 {
         (self.input.height_mm * ROUND_PER_HEIGHT)
@@ -100,7 +126,7 @@ impl Builder<'_> {
         let (a, b) = flexure.end_axes(at_end);
         let wall = self.input.least_wall_mm;
         let radius = STUB_RADIUS_MM.max(a + wall);
-        let reach = STUB_FREE_MM + self.ball_radius();
+        let reach = self.stub_free() + self.ball_radius();
         let (nose, root) = (p + outward * (radius - STUB_OVER_MM), p + outward * reach);
         // No axis: the end is taken as it points.
         let end = FlexureEnd { flexure: index, at_end, axis: Vector3::zeros() };
@@ -181,11 +207,12 @@ impl Builder<'_> {
         self.nodes.push(Node { at: best.end, own_eye: None, anchor: beside });
     }
 
-    /// Whether a bar or ball would run into a flexure, another body's stub, or the room of a hinge.
+    /// Whether a bar or ball would run into a flexure, another body's stub, a held body, or the room of a hinge.
     fn runs_into(&self, bar: &Slot) -> bool {
         let mut eyes = self.input.bodies.iter().flat_map(|b| &b.eyes);
         self.hits(bar)
             || self.in_guide(bar, true)
+            || self.held_slots().iter().any(|s| nearer_than(bar, s, self.input.clearance_mm))
             || eyes.any(|e| {
                 let room = self.eye_shape(e).keep_out - CLEAR_MM;
                 let stack = Slot::bar(e.point, e.point, e.axis, room, self.half(), 0.0);
