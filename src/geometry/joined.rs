@@ -94,7 +94,7 @@ pub fn frame(
         height_mm: like.height_mm,
         clearance_mm: like.clearance_mm,
         least_wall_mm: like.least_wall_mm,
-        facets: like.facets.clone(),
+        facets: like.facets,
     };
     let made = build_parts(&input)?;
     match (made.parts.into_iter().next(), made.plans.into_iter().next()) {
