@@ -4,6 +4,7 @@ and pillow; docs/chebyshev.png is made of the example's parts by
     python docs/picture.py docs/chebyshev.png out/chebyshev_lambda_*.stl
 """
 
+import itertools
 import os
 import sys
 import tempfile
@@ -17,6 +18,20 @@ UP = (0.0, 1.0, 0.25)
 WIDTH, HEIGHT = 1200, 1000
 # Drawn larger, then reduced: smooth edges whatever the renderer can do.
 OVERSAMPLING = 2
+# Beyond what shows the parts' sphere, as far as their box stays inside the picture.
+LARGEST_ZOOM = 1.2
+WITHIN = 0.97
+
+
+def reach(renderer):
+    """How far the box of all parts reaches from the middle of the picture; 1 is its edge."""
+    bounds = renderer.ComputeVisiblePropBounds()
+    far = 0.0
+    for corner in itertools.product(bounds[0:2], bounds[2:4], bounds[4:6]):
+        renderer.SetWorldPoint(*corner, 1.0)
+        renderer.WorldToView()
+        far = max(far, *(abs(v) for v in renderer.GetViewPoint()[:2]))
+    return far
 
 
 def draw(parts, out):
@@ -53,7 +68,7 @@ def draw(parts, out):
     camera.SetViewUp(*UP)
     camera.SetViewAngle(18)
     renderer.ResetCamera()
-    camera.Zoom(1.2)
+    camera.Zoom(min(LARGEST_ZOOM, WITHIN / reach(renderer)))
     window.Render()
     grab = vtk.vtkWindowToImageFilter()
     grab.SetInput(window)

@@ -44,13 +44,25 @@ fn the_solved_example_keeps_its_clearance() {
         "{:?}",
         simulation.diagnostics
     );
-    assert_eq!(measure(&design, &simulation).gap.least_mm, Some(gap));
+    let measures = measure(&design, &simulation);
+    assert_eq!(measures.gap.least_mm, Some(gap));
+    // Where it is: two of the design's members, in the state whose gap it is; and so for the stress.
+    let place = measures.gap.place.unwrap();
+    assert_eq!((place.of.len(), simulation.gaps_mm[place.state]), (2, gap));
+    let known =
+        |n: &String| design.bodies.iter().any(|b| b.name == *n) || design.rods.iter().any(|r| r.path == *n);
+    assert!(place.of.iter().all(known), "{place:?}");
+    let stressed = measures.stress.place.unwrap();
+    assert_eq!(Some(simulation.motion.states[stressed.state].stress_max_mpa), measures.stress.max_mpa);
+    assert!(design.rods.iter().any(|r| [r.path.clone()] == stressed.of[..]), "{stressed:?}");
     for (bound, holds) in [(gap - 1e-3, true), (gap + 1e-3, false)] {
         require_gap(&mut design, bound);
         let mut found = Vec::new();
         let result = check_requirements(&design, &simulation, &mut found);
         assert_eq!((result[0].pass, result[0].value, result[0].unit), (holds, Some(gap), "mm"));
         assert_eq!(found.is_empty(), holds);
+        let told = |d: &flexura::diagnostic::Diagnostic| d.labels[0].text.contains(&place.told());
+        assert!(found.iter().all(told), "{found:?}");
     }
 }
 
