@@ -38,6 +38,7 @@ pub fn parts_input(design: &Design, layout: &Layout, model: &Model) -> PartsInpu
                 });
             BodySolid {
                 name: body.name.clone(),
+                of_flexure: body.owner.is_some(),
                 axis: layers.map(|(axis, _)| axis),
                 level_mm: layers.map_or(0.0, |(_, level)| level),
                 skeleton: skeleton.map(|p| layout.rest_poses[b].point(&p)).collect(),

@@ -161,8 +161,8 @@ pub(super) struct Builder<'a> {
     pub(super) index: usize,
     /// What moves beside the body, seen from it; found when first asked for.
     pub(super) moving: OnceCell<Vec<Near>>,
-    /// What templates' own bodies are made of; found when first asked for.
-    pub(super) held: OnceCell<Vec<Slot>>,
+    /// What flexures' own bodies are made of; found when first asked for.
+    pub(super) of_flexures: OnceCell<Vec<Slot>>,
     /// Places of eyes in other layers that cannot be reached straight.
     pub(super) risen: Vec<Vector3<f64>>,
 }
@@ -176,7 +176,7 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
         input,
         plan: BodyPlan::default(),
         moving: OnceCell::new(),
-        held: OnceCell::new(),
+        of_flexures: OnceCell::new(),
         risen: Vec::new(),
         nodes: Vec::new(),
         axis: body.axis.unwrap_or_else(Vector3::z),

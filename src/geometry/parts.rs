@@ -60,6 +60,8 @@ pub struct BodySolid {
     pub eyes: Vec<Eye>,
     /// Conventional sliders.
     pub guides: Vec<Guide>,
+    /// A body that a flexure's template brings along.
+    pub of_flexure: bool,
 }
 
 /// A body's share of a conventional slider: a square bar in a sleeve.

@@ -20,16 +20,11 @@ const ROUND_PER_HEIGHT: f64 = 0.25;
 const NECK_DIRECTIONS: usize = 24;
 /// What a neck that runs into something costs beyond its way, mm.
 const BLOCKED_MM: f64 = 1e4;
-/// Length of a stub in front of its ball in a body that only joins flexures, mm: the ball just stays behind the
+/// Length of a stub in front of its ball in a flexure's own body, mm: the ball just stays behind the
 /// attachment plane.
-const HELD_FREE_MM: f64 = 0.3;
+const OWN_FREE_MM: f64 = 0.3;
 /// Leaves whose wide directions differ by less (sine) share sub-layers.
 const STACKED: f64 = 0.1;
-
-/// Whether flexures alone hold a body: a template's own.
-fn held(body: &BodySolid) -> bool {
-    body.skeleton.is_empty() && body.eyes.is_empty() && body.guides.is_empty()
-}
 
 impl Builder<'_> {
     /// Plans a body in space.
@@ -81,20 +76,24 @@ impl Builder<'_> {
         Ok(())
     }
 
-    /// Length of a stub in front of its ball. A held body has nothing to keep away from its flexures, and moves between
+    /// Length of a stub in front of its ball. A flexure's own body has nothing to keep away from its flexures, and moves between
     /// its neighbours: the smaller the better.
     fn stub_free(&self) -> f64 {
-        if self.input.bodies.get(self.index).is_some_and(held) { HELD_FREE_MM } else { STUB_FREE_MM }
+        if self.input.bodies.get(self.index).is_some_and(|b| b.of_flexure) {
+            OWN_FREE_MM
+        } else {
+            STUB_FREE_MM
+        }
     }
 
-    /// What held bodies are made of: they stand first, and the other bodies' bars go round them.
-    fn held_slots(&self) -> &[Slot] {
-        self.held.get_or_init(|| {
+    /// What flexures' own bodies are made of: they stand first, and the other bodies' bars go round them.
+    fn slots_of_flexures(&self) -> &[Slot] {
+        self.of_flexures.get_or_init(|| {
             let bodies = &self.input.bodies;
-            if bodies.get(self.index).is_none_or(held) {
+            if bodies.get(self.index).is_none_or(|b| b.of_flexure) {
                 return Vec::new();
             }
-            let plans = (0..bodies.len()).filter(|b| held(&bodies[*b])).map(|b| plan_body(self.input, b));
+            let plans = (0..bodies.len()).filter(|b| bodies[*b].of_flexure).map(|b| plan_body(self.input, b));
             plans.flatten().flat_map(|plan| plan.slots).map(|(_, slot)| slot).collect()
         })
     }
@@ -207,12 +206,12 @@ impl Builder<'_> {
         self.nodes.push(Node { at: best.end, own_eye: None, anchor: beside });
     }
 
-    /// Whether a bar or ball would run into a flexure, another body's stub, a held body, or the room of a hinge.
+    /// Whether a bar or ball would run into a flexure, another body's stub, a flexure's own body, or the room of a hinge.
     fn runs_into(&self, bar: &Slot) -> bool {
         let mut eyes = self.input.bodies.iter().flat_map(|b| &b.eyes);
         self.hits(bar)
             || self.in_guide(bar, true)
-            || self.held_slots().iter().any(|s| nearer_than(bar, s, self.input.clearance_mm))
+            || self.slots_of_flexures().iter().any(|s| nearer_than(bar, s, self.input.clearance_mm))
             || eyes.any(|e| {
                 let room = self.eye_shape(e).keep_out - CLEAR_MM;
                 let stack = Slot::bar(e.point, e.point, e.axis, room, self.half(), 0.0);

@@ -133,7 +133,7 @@ pub fn chebyshev(bulge_deg: f64, facets: Facets) -> PartsInput {
         level_mm: layer * pitch,
         skeleton,
         eyes,
-        guides: Vec::new(),
+        ..BodySolid::default()
     };
     let eye = |joint: usize, point: Vector3<f64>, bore: Bore, slot: usize| Eye {
         joint,
