@@ -1,12 +1,11 @@
 //! Cost against size: a row of Theo Jansen's legs on one crank pin, solved as one design, nothing free.
 
 use super::designs::{design, example, layout, starts};
-use super::{Report, Time, WHOLE};
+use super::{Report, Time, WHOLE, once};
 use flexura::equilibrium::{Model, sweep};
 use flexura::kinematics::solve_motion;
 use flexura::pipeline::EDGES;
 use std::fmt::Write;
-use std::time::Instant;
 
 /// What all legs have in common, in units of 1.2 mm.
 const COMMON: &str = "
@@ -93,27 +92,26 @@ pub fn legs(report: &mut Report) {
         assert_eq!(design.rods.len(), alone * legs);
         let size = format!("{legs} legs, {} rods, {} bodies", design.rods.len(), design.bodies.len());
         let start = starts(&design);
-        let began = Instant::now();
-        if let Err(why) = solve_motion(&design, &start) {
+        let (motion, moved) = once(|| solve_motion(&design, &start));
+        if let Err(why) = moved {
             let why = why.first().map(|d| d.message.clone()).unwrap_or_default();
             report.note("legs", &format!("not simulated: {why}"), &size, "–".into(), "s");
             report.set("legs_s", &key, None);
             continue;
         }
-        let motion = began.elapsed().as_secs_f64();
         let layout = layout(&design);
-        let began = Instant::now();
-        let model = Model::new(&design, &layout, &start, EDGES, false).expect("rods");
-        let swept = sweep(&model);
-        let equilibria = began.elapsed().as_secs_f64();
+        let (equilibria, swept) = once(|| {
+            let model = Model::new(&design, &layout, &start, EDGES, false).expect("rods");
+            sweep(&model)
+        });
         if let Err(e) = swept {
             report.note("legs", &format!("lost at state {}", e.state), &size, "–".into(), "s");
             report.set("legs_s", &key, None);
             continue;
         }
-        let once = |t: f64| Time { least: t, median: t };
-        report.row("legs", "conventional motion", &size, once(motion), WHOLE);
-        report.row("legs", "equilibria", &size, once(equilibria), WHOLE);
+        let time = |t: f64| Time { least: t, median: t };
+        report.row("legs", "conventional motion", &size, time(motion), WHOLE);
+        report.row("legs", "equilibria", &size, time(equilibria), WHOLE);
         report.set("legs_s", &key, Some(motion + equilibria));
     }
 }
