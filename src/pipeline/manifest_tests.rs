@@ -141,7 +141,7 @@ fn what_changes_the_outcome_is_built() {
     let changes: [fn(&mut Design); 4] = [
         |d| d.requirements[0].bound = 0.6,
         |d| d.requirements.clear(),
-        |d| drop(d.exports.pop()),
+        |d| d.exports.truncate(1),
         |d| d.material.e_mpa = 2000.0,
     ];
     for change in changes {
