@@ -10,10 +10,25 @@ use pest::{Parser, Token};
 #[grammar = "../grammar/mech.pest"]
 struct Mech;
 
-/// Parses a whole file. The grammar accepts every text; `None` would be a fault of the grammar.
+/// Parses a whole file, item by item: the parser's own list of a large file would not fit into the processor's caches.
+/// The grammar accepts every text; `None` would be a fault of the grammar.
 pub(super) fn tree(source: &str) -> Option<Node> {
-    let pair = Mech::parse(Rule::file, source).ok()?.next()?;
-    node(pair, source)
+    let mut children = Vec::new();
+    let mut filled = 0;
+    // A byte order mark is filled in with the rest of what is no item.
+    let mut at = if source.starts_with('\u{FEFF}') { '\u{FEFF}'.len_utf8() } else { 0 };
+    while let Some(pair) = source.get(at..).and_then(|rest| Mech::parse(Rule::next_item, rest).ok()?.next()) {
+        let end = at + pair.as_span().end();
+        for child in nodes(pair, at, source) {
+            fill(source, filled..child.start as usize, &mut children);
+            filled = child.end as usize;
+            children.push(child);
+        }
+        at = end;
+    }
+    Mech::parse(Rule::rest_of_file, source.get(at..)?).ok()?;
+    fill(source, filled..source.len(), &mut children);
+    Some(Node { kind: Kind::File, start: 0, end: source.len() as u32, children: children.into() })
 }
 
 /// What a broken part should have been.
@@ -165,9 +180,9 @@ struct Open {
     is_leaf: bool,
 }
 
-/// The node of a pair; bytes between its inner pairs become leaves. One walk over the parser's tokens: a node's parts
-/// are moved into a list of just their number, which for large files takes half the time and memory of growing lists.
-fn node(pair: Pair<'_, Rule>, source: &str) -> Option<Node> {
+/// The nodes in a pair whose text begins at `base`; bytes between inner pairs become leaves. One walk over the parser's
+/// tokens: a node's parts are moved into a list of just their number.
+fn nodes(pair: Pair<'_, Rule>, base: usize, source: &str) -> Vec<Node> {
     let mut open: Vec<Open> = Vec::new();
     let mut finished: Vec<Node> = Vec::new();
     let mut parts: Vec<Node> = Vec::new();
@@ -177,14 +192,20 @@ fn node(pair: Pair<'_, Rule>, source: &str) -> Option<Node> {
                 if let Some(outer) = open.last_mut() {
                     outer.is_leaf = false;
                 }
-                open.push(Open { rule, start: pos.pos(), first: finished.len(), is_leaf: true });
+                let start = base + pos.pos();
+                open.push(Open { rule, start, first: finished.len(), is_leaf: true });
                 continue;
             }
-            Token::End { pos, .. } => (open.pop()?, pos.pos()),
+            Token::End { pos, .. } => match open.pop() {
+                Some(this) => (this, base + pos.pos()),
+                None => break,
+            },
         };
         // `3` is a sum of one product of one …: such levels say nothing and would cost stack.
         let is_level = matches!(this.rule, Rule::sum | Rule::product | Rule::unary | Rule::power);
-        if matches!(this.rule, Rule::EOI | Rule::line_end) || is_level && finished.len() == this.first + 1 {
+        if matches!(this.rule, Rule::EOI | Rule::line_end | Rule::next_item)
+            || is_level && finished.len() == this.first + 1
+        {
             continue;
         }
         let kind = kind(this.rule);
@@ -200,7 +221,7 @@ fn node(pair: Pair<'_, Rule>, source: &str) -> Option<Node> {
         let children = parts.drain(..).collect();
         finished.push(Node { kind, start: this.start as u32, end: end as u32, children });
     }
-    finished.pop()
+    finished
 }
 
 fn is_token(kind: Kind) -> bool {
@@ -222,7 +243,6 @@ fn is_token(kind: Kind) -> bool {
 
 fn kind(rule: Rule) -> Kind {
     match rule {
-        Rule::file => Kind::File,
         Rule::edition => Kind::Edition,
         Rule::import => Kind::Import,
         Rule::path => Kind::Path,
