@@ -59,7 +59,7 @@ fn the_solved_example_keeps_its_clearance() {
         require_gap(&mut design, bound);
         let mut found = Vec::new();
         let result = check_requirements(&design, &simulation, &mut found);
-        assert_eq!((result[0].pass, result[0].value, result[0].unit), (holds, Some(gap), "mm"));
+        assert_eq!((result[0].pass, result[0].value, result[0].unit.as_ref()), (holds, Some(gap), "mm"));
         assert_eq!(found.is_empty(), holds);
         let told = |d: &flexura::diagnostic::Diagnostic| d.labels[0].text.contains(&place.told());
         assert!(found.iter().all(told), "{found:?}");

@@ -1,6 +1,7 @@
 //! Writing to the disk: whole files or none (a temporary file beside the target, then a rename), and only
 //! below the folder that was asked for.
 
+use flexura::pipeline::Made;
 use std::fmt;
 use std::io::Write;
 use std::path::{Component, Path, PathBuf};
@@ -18,16 +19,38 @@ impl fmt::Display for WriteError {
     }
 }
 
-/// Writes `name` (relative, with `/`) below `folder`; returns its path.
+/// Where `name` (relative, with `/`) lies below `folder`.
+fn below(folder: &Path, name: &str) -> Option<PathBuf> {
+    let plain = Path::new(name).components().all(|c| matches!(c, Component::Normal(_)));
+    (plain && !name.is_empty()).then(|| folder.join(name))
+}
+
+/// Writes `name` (relative, with `/`) below `folder`; returns its path. A file that holds these bytes already is left
+/// alone.
 pub fn write_below(folder: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, WriteError> {
-    let relative = Path::new(name);
-    let path = folder.join(relative);
-    let plain = relative.components().all(|c| matches!(c, Component::Normal(_)));
-    if !plain || name.is_empty() {
+    let Some(path) = below(folder, name) else {
+        let path = folder.join(name);
         return Err(WriteError { path, reason: "it would lie outside the output folder".into() });
+    };
+    if read_regular(&path).is_none_or(|old| old != bytes) {
+        write_atomic(&path, bytes)?;
     }
-    write_atomic(&path, bytes)?;
     Ok(path)
+}
+
+/// The output folder, as what was made there before.
+pub struct Output<'a>(pub &'a Path);
+
+impl Made for Output<'_> {
+    fn read(&self, name: &str) -> Option<Vec<u8>> {
+        read_regular(&below(self.0, name)?)
+    }
+}
+
+/// The bytes of a regular file: what is linked from elsewhere was not made here, and a pipe could block for ever.
+fn read_regular(path: &Path) -> Option<Vec<u8>> {
+    let regular = path.symlink_metadata().is_ok_and(|m| m.is_file());
+    if regular { std::fs::read(path).ok() } else { None }
 }
 
 /// Writes a whole file or leaves the old one.

@@ -1,6 +1,6 @@
 //! One function a command: files to a request, the pipeline, its outcome to files and reports.
 
-use super::artefacts::{WriteError, write_atomic, write_below};
+use super::artefacts::{Output, WriteError, write_atomic, write_below};
 use super::progress::Terminal;
 use super::render::tell;
 use super::sources::{Folder, read_text};
@@ -133,7 +133,8 @@ pub fn build(arguments: &Build) -> u8 {
     let progress = Terminal::new(common.format == Format::Human);
     let cancel = stop_on_ctrl_c(progress.on_stop());
     let compiler = Compiler { method: arguments.optimizer.into(), iterations: arguments.iterations as usize };
-    let mut out = pipeline::build(&opened.request, &compiler, &opened.folder, &progress, &cancel);
+    let made = Output(&arguments.out);
+    let mut out = pipeline::build_upon(&opened.request, &made, &compiler, &opened.folder, &progress, &cancel);
     progress.finish();
     opened.name_as_written(&mut out.sources);
     let written = match write(&out, &arguments.out, &lock_path) {
@@ -173,22 +174,22 @@ fn json(out: &BuildOutcome) -> serde_json::Value {
         "before": out.before,
         "after": out.after,
         "seconds": out.seconds,
-        "artefacts": out.artefacts.iter().map(|a| &a.name).collect::<Vec<_>>(),
+        "artefacts": out.made().map(|(name, _)| name).collect::<Vec<_>>(),
         "diagnostics": render::json(&out.diagnostics, &out.sources),
     })
 }
 
-/// Writes lock and artefacts; returns their paths and sizes.
+/// Writes lock and artefacts, and the manifest last: it is true only of what is there. Returns paths and sizes.
 fn write(out: &BuildOutcome, folder: &Path, lock_path: &Path) -> Result<Vec<(String, usize)>, WriteError> {
     let mut written = Vec::new();
     if let Some(lock) = &out.lock {
         write_atomic(lock_path, lock.as_bytes())?;
         written.push((lock_path.display().to_string(), lock.len()));
     }
-    for artefact in &out.artefacts {
-        let path = write_below(folder, &artefact.name, &artefact.bytes)?;
-        written.push((path.display().to_string(), artefact.bytes.len()));
+    for artefact in out.artefacts.iter().chain(&out.manifest) {
+        write_below(folder, &artefact.name, &artefact.bytes)?;
     }
+    written.extend(out.made().map(|(name, bytes)| (folder.join(name).display().to_string(), bytes)));
     Ok(written)
 }
 

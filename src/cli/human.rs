@@ -40,7 +40,8 @@ pub fn report(out: &BuildOutcome, written: &[(String, usize)], style: Style) -> 
         "{:.2} s: check {:.2}, solve {:.2}, mesh {:.2}, emit {:.2}",
         s.total, s.check, s.solve, s.mesh, s.emit
     );
-    let _ = writeln!(text, "\n{}", style.dim(&times));
+    let unchanged = if out.unchanged { "nothing has changed since the last build, " } else { "" };
+    let _ = writeln!(text, "\n{}", style.dim(&format!("{unchanged}{times}")));
     text
 }
 
@@ -201,7 +202,7 @@ mod tests {
             requirements: vec![RequirementResult {
                 text: "max(error(tip)) <= 1 mm".into(),
                 value: Some(0.34),
-                unit: "mm",
+                unit: "mm".into(),
                 bound: 1.0,
                 pass: true,
             }],

@@ -143,7 +143,9 @@ impl<'a> Evaluator<'a> {
         let (name, kind) = (entry.name.clone(), entry.kind.clone());
         self.set_state(scope, local, State::Busy);
         self.busy.push((Key::Local(scope, local), name, asked_at));
-        let around = std::mem::replace(&mut self.as_is, is_limit(&kind));
+        // Nothing is multiplied at scale 1: then it is not looked for.
+        let limit = self.scale != 1.0 && is_limit(&kind);
+        let around = std::mem::replace(&mut self.as_is, limit);
         let value = self.declared(&kind);
         self.as_is = around;
         self.busy.pop();

@@ -1,12 +1,13 @@
 //! Series over the cycle beside traces and loads: nearest distances, traced directions, angles of bodies.
 
 use super::measure::aggregate;
+use super::report::or_nan;
 use crate::equilibrium::{Cycle, Equilibrium, Layout, LayoutTrace, angle_between};
 use crate::ir::{Aggregate, Design};
 use crate::kinematics::Motion;
 use crate::math::{nearest_turn, twist_about};
 use nalgebra::Vector3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// One value a state in every list.
@@ -116,21 +117,26 @@ impl AimSeries {
 }
 
 /// A traced direction against its target.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DirectionMeasures {
     /// Mean angle (a closed cycle's last state counts once), deg.
+    #[serde(deserialize_with = "or_nan")]
     pub mean_error_deg: f64,
     /// Largest angle, deg.
+    #[serde(deserialize_with = "or_nan")]
     pub max_error_deg: f64,
 }
 
 /// An `output` over the cycle.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct OutputMeasures {
     /// Least angle, deg.
+    #[serde(deserialize_with = "or_nan")]
     pub min_deg: f64,
     /// Largest angle, deg.
+    #[serde(deserialize_with = "or_nan")]
     pub max_deg: f64,
     /// Largest minus least, deg.
+    #[serde(deserialize_with = "or_nan")]
     pub span_deg: f64,
 }

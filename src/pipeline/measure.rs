@@ -98,7 +98,7 @@ pub(super) fn check_requirement(
     RequirementResult {
         text: requirement.text.clone(),
         value: value.map(shown),
-        unit,
+        unit: unit.into(),
         bound: shown(bound),
         pass,
     }

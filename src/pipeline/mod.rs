@@ -5,6 +5,7 @@ mod aims;
 mod assembly;
 mod compiler;
 mod joined;
+mod manifest;
 mod measure;
 mod progress;
 mod report;
@@ -14,14 +15,15 @@ mod stages;
 
 pub use aims::{AimSeries, DirectionMeasures, OutputMeasures};
 pub use compiler::{Compiler, EDGES};
+pub use manifest::COMPILER;
 pub use measure::{aggregate, check_requirements, is_closed, measure};
 pub use progress::{Iteration, Progress, Stage};
 pub use report::{
-    Artefact, BuildOutcome, DriveMeasures, GapMeasures, Measures, Origin, Place, RequirementResult, Seconds,
-    StressMeasures, TraceMeasures, Worst,
+    Artefact, BuildOutcome, DriveMeasures, GapMeasures, Kept, Measures, Origin, Place, RequirementResult,
+    Seconds, StressMeasures, TraceMeasures, Worst,
 };
 pub use stability::{DriveValues, LimitPoint, RestState, SnapThrough, Stability};
-pub use stages::{Between, Checked, Failed, Simulation, Solved, Stages};
+pub use stages::{Between, Checked, Failed, Made, NothingMade, Simulation, Solved, Stages};
 
 use crate::diagnostic::{Diagnostic, Severity};
 pub use crate::elaborate::{FileError, Files};
@@ -41,7 +43,7 @@ pub struct Request {
     pub steps: Option<usize>,
     /// The lock as it stands: its name and text.
     pub lock: Option<(String, String)>,
-    /// Ignore the lock.
+    /// Ignore the lock, and what has been made before.
     pub fresh: bool,
     /// Refuse to solve: the lock must be current.
     pub frozen: bool,
@@ -56,7 +58,7 @@ pub struct Show {
     pub poses: bool,
 }
 
-/// Text to artefacts.
+/// Text to artefacts, into an empty folder.
 pub fn build(
     request: &Request,
     stages: &dyn Stages,
@@ -64,9 +66,21 @@ pub fn build(
     progress: &dyn Progress,
     cancel: &AtomicBool,
 ) -> BuildOutcome {
+    build_upon(request, &NothingMade, stages, files, progress, cancel)
+}
+
+/// Text to artefacts. Where `made` holds those of just this design, the outcome only tells what their build told.
+pub fn build_upon(
+    request: &Request,
+    made: &dyn Made,
+    stages: &dyn Stages,
+    files: &dyn Files,
+    progress: &dyn Progress,
+    cancel: &AtomicBool,
+) -> BuildOutcome {
     let began = progress.seconds();
     let mut out = BuildOutcome::default();
-    run_build(request, stages, files, progress, cancel, &mut out);
+    run_build(request, made, stages, files, progress, cancel, &mut out);
     out.seconds.total = progress.seconds() - began;
     out
 }
@@ -74,6 +88,7 @@ pub fn build(
 /// `None` ends the way early; `out` then holds what was reached and why not more.
 fn run_build(
     request: &Request,
+    made: &dyn Made,
     stages: &dyn Stages,
     files: &dyn Files,
     progress: &dyn Progress,
@@ -93,6 +108,19 @@ fn run_build(
     let solutions = solutions?;
     let pairs = || assembly.designs.iter().zip(&solutions);
     let values: Vec<Vec<f64>> = pairs().map(|(design, solution)| values_of(design, solution)).collect();
+
+    // Nothing to do where all of it has been done.
+    let clock = Clock::start(progress, Stage::Emit);
+    let fingerprint = manifest::Fingerprint::of(&assembly, &values);
+    let recalled = if request.fresh { None } else { manifest::recall(made, &request.source, &fingerprint) };
+    clock.stop(&mut out.seconds.emit);
+    if let Some(recalled) = recalled {
+        (out.before, out.after, out.kept) = (recalled.before, recalled.after, recalled.kept);
+        (out.requirements, out.unchanged) = (recalled.requirements, true);
+        out.diagnostics.extend(recalled.diagnostics);
+        return Some(());
+    }
+    let told = out.diagnostics.len();
 
     // Values to numbers: before, after, and what was required.
     let clock = Clock::start(progress, Stage::Simulate);
@@ -126,6 +154,8 @@ fn run_build(
     clock.stop(&mut out.seconds.mesh);
     let clock = Clock::start(progress, Stage::Emit);
     emit_sketches(&assembly, &values, out);
+    let manifest = manifest::write(out, told, &fingerprint);
+    out.manifest = manifest.map(|bytes| Artefact { name: manifest::name(&request.source), bytes });
     clock.stop(&mut out.seconds.emit);
     Some(())
 }

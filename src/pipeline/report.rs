@@ -4,19 +4,20 @@ use super::aims::{DirectionMeasures, OutputMeasures};
 use super::stability::Stability;
 use crate::diagnostic::{Diagnostic, SourceMap};
 use crate::ir::{Assembly, Design, Solution};
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// The mechanism's measures over the cycle.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measures {
     /// By trace.
     pub traces: BTreeMap<String, TraceMeasures>,
     /// By traced direction.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub directions: BTreeMap<String, DirectionMeasures>,
     /// By output.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub outputs: BTreeMap<String, OutputMeasures>,
     /// By drive.
     pub drives: BTreeMap<String, DriveMeasures>,
@@ -29,28 +30,33 @@ pub struct Measures {
 }
 
 /// A trace against its target: the place of the same time, or where it is tracked by form only, the nearest one.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TraceMeasures {
     /// Mean distance (a closed cycle's last state counts once), mm.
+    #[serde(deserialize_with = "or_nan")]
     pub mean_error_mm: f64,
     /// Largest distance, mm.
+    #[serde(deserialize_with = "or_nan")]
     pub max_error_mm: f64,
     /// Length of the traced path, mm.
+    #[serde(deserialize_with = "or_nan")]
     pub path_length_mm: f64,
 }
 
 /// A drive's load.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum DriveMeasures {
     /// Of a turning drive.
     Torque {
         /// Largest size of the torque, N·mm.
+        #[serde(deserialize_with = "or_nan")]
         max_torque_n_mm: f64,
     },
     /// Of a sliding drive.
     Force {
         /// Largest size of the force, N.
+        #[serde(deserialize_with = "or_nan")]
         max_force_n: f64,
     },
 }
@@ -66,7 +72,7 @@ impl DriveMeasures {
 }
 
 /// Stress over the cycle.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StressMeasures {
     /// True largest von Mises stress, MPa; none without rods.
     pub max_mpa: Option<f64>,
@@ -76,7 +82,7 @@ pub struct StressMeasures {
 }
 
 /// Distance of the printed solids over the cycle: bodies and flexures, without what is joined by construction.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GapMeasures {
     /// Least distance, mm, negative where two overlap; none where there is nothing to compare.
     pub least_mm: Option<f64>,
@@ -86,7 +92,7 @@ pub struct GapMeasures {
 }
 
 /// Where something is at its worst.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Place {
     /// Bodies and flexures.
     pub of: Vec<String>,
@@ -143,18 +149,24 @@ pub struct Seconds {
 }
 
 /// A `require` line and what was measured.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RequirementResult {
     /// The line as written.
     pub text: String,
     /// Measured value; none if it could not be measured.
     pub value: Option<f64>,
     /// Unit of value and bound.
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     /// The bound.
+    #[serde(deserialize_with = "or_nan")]
     pub bound: f64,
     /// Whether it holds.
     pub pass: bool,
+}
+
+/// A number that JSON has as null where it is not finite.
+pub(super) fn or_nan<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::NAN))
 }
 
 /// A file to write: a path relative to the output folder, with `/`, and its content.
@@ -164,6 +176,15 @@ pub struct Artefact {
     pub name: String,
     /// Content.
     pub bytes: Vec<u8>,
+}
+
+/// A file that stands as it would be written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Kept {
+    /// Relative path.
+    pub name: String,
+    /// Its size.
+    pub bytes: usize,
 }
 
 /// Where the values came from.
@@ -203,6 +224,12 @@ pub struct BuildOutcome {
     pub requirements: Vec<RequirementResult>,
     /// Files to write.
     pub artefacts: Vec<Artefact>,
+    /// Nothing has changed since the last build: there is nothing to write but perhaps a lock.
+    pub unchanged: bool,
+    /// Files that stand already, in place of `artefacts`.
+    pub kept: Vec<Kept>,
+    /// What to write after the artefacts, so that the next build can tell whether anything has changed.
+    pub manifest: Option<Artefact>,
     /// Text of the lock, if it is to be written.
     pub lock: Option<String>,
     /// Times.
@@ -210,6 +237,12 @@ pub struct BuildOutcome {
 }
 
 impl BuildOutcome {
+    /// Names and sizes of the files that stand in the output folder afterwards.
+    pub fn made(&self) -> impl Iterator<Item = (&str, usize)> {
+        let new = self.artefacts.iter().map(|a| (a.name.as_str(), a.bytes.len()));
+        new.chain(self.kept.iter().map(|k| (k.name.as_str(), k.bytes)))
+    }
+
     /// Whether the design has errors or a requirement fails.
     pub fn failed(&self) -> bool {
         self.diagnostics.iter().any(Diagnostic::is_error) || self.requirements.iter().any(|r| !r.pass)

@@ -3,14 +3,14 @@
 use crate::diagnostic::Diagnostic;
 use crate::equilibrium::{Cycle, Landscape, Layout, Model, Snap, landscape};
 use crate::ir::{Design, DriveUnit};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Drive values by `NAME_deg` or `NAME_mm`, as in the table of `simulate`.
 pub type DriveValues = BTreeMap<String, f64>;
 
 /// Rest states with the drives released, of several drives along the cycle's way only.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Stability {
     /// In the order of the only drive's value, else along the cycle.
     pub rest_states: Vec<RestState>,
@@ -22,7 +22,7 @@ pub struct Stability {
 }
 
 /// A state in which the released mechanism stays.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RestState {
     /// Drive values there.
     pub drives: DriveValues,
@@ -39,7 +39,7 @@ pub struct RestState {
 }
 
 /// A maximum of the load.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LimitPoint {
     /// Drive value there.
     pub drives: DriveValues,
@@ -50,7 +50,7 @@ pub struct LimitPoint {
 }
 
 /// A jump.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SnapThrough {
     /// Drive values just before.
     pub drives: DriveValues,

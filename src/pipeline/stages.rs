@@ -66,6 +66,23 @@ pub struct Solved {
     pub diagnostics: Vec<Diagnostic>,
 }
 
+/// What already stands in the output folder.
+pub trait Made {
+    /// The bytes of a file by its name relative to the folder, with `/`; none where there is none, or it is not to be
+    /// read.
+    fn read(&self, name: &str) -> Option<Vec<u8>>;
+}
+
+/// An output folder with nothing in it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NothingMade;
+
+impl Made for NothingMade {
+    fn read(&self, _: &str) -> Option<Vec<u8>> {
+        None
+    }
+}
+
 /// The stages. `values` are the free variables in the design's order.
 pub trait Stages {
     /// Text to design. `overrides` are `--set` names and expressions; `steps` overrides the cycle's.

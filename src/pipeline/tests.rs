@@ -12,7 +12,7 @@ use std::cell::Cell;
 use std::sync::atomic::Ordering;
 
 /// A design with one free variable `x` whose error is |x − 1| mm at every state.
-fn design() -> Design {
+pub(super) fn design() -> Design {
     let mut exprs = ExprGraph::default();
     let zero = exprs.constant(0.0);
     let origin = crate::ir::Origin::default();
@@ -89,10 +89,14 @@ fn design() -> Design {
 }
 
 #[derive(Default)]
-struct Toy {
-    solved: Cell<usize>,
-    started_at: Cell<f64>,
-    change: Option<fn(&mut Design)>,
+pub(super) struct Toy {
+    pub(super) solved: Cell<usize>,
+    /// How often a cycle was simulated.
+    pub(super) simulated: Cell<usize>,
+    pub(super) started_at: Cell<f64>,
+    pub(super) change: Option<fn(&mut Design)>,
+    /// What the simulation finds.
+    pub(super) finds: Option<fn(&Design) -> Diagnostic>,
 }
 
 impl Stages for Toy {
@@ -113,6 +117,7 @@ impl Stages for Toy {
     }
 
     fn simulate(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
+        self.simulated.set(self.simulated.get() + 1);
         let n = design.cycle.steps + 1;
         let state =
             MotionState { traces_mm: vec![[0.0; 3]], drive_loads: vec![-7.0], ..MotionState::default() };
@@ -120,6 +125,7 @@ impl Stages for Toy {
         Ok(Simulation {
             motion: MotionTable { states: vec![state; n], bodies, ..Default::default() },
             errors_mm: vec![vec![(values[0] - 1.0).abs(); n]],
+            diagnostics: self.finds.map(|finds| finds(design)).into_iter().collect(),
             ..Simulation::default()
         })
     }
@@ -147,14 +153,14 @@ impl Stages for Toy {
     }
 }
 
-struct NoFiles;
+pub(super) struct NoFiles;
 impl Files for NoFiles {
     fn read(&self, _: &str) -> Result<String, FileError> {
         Err(FileError::NotFound)
     }
 }
 
-struct Ticks(Cell<f64>);
+pub(super) struct Ticks(pub(super) Cell<f64>);
 impl Progress for Ticks {
     fn seconds(&self) -> f64 {
         self.0.set(self.0.get() + 1.0);
@@ -166,11 +172,11 @@ fn run(toy: &Toy, request: &Request, cancelled: bool) -> BuildOutcome {
     build(request, toy, &NoFiles, &Ticks(Cell::new(0.0)), &AtomicBool::new(cancelled))
 }
 
-fn codes(out: &BuildOutcome) -> Vec<&str> {
+pub(super) fn codes(out: &BuildOutcome) -> Vec<&str> {
     out.diagnostics.iter().map(|d| d.code.as_str()).collect()
 }
 
-fn with_lock(out: &BuildOutcome) -> Request {
+pub(super) fn with_lock(out: &BuildOutcome) -> Request {
     Request { lock: Some(("toy.lock".into(), out.lock.clone().unwrap())), ..Request::default() }
 }
 

@@ -58,6 +58,7 @@ mod condense;
 mod derivative_tests;
 mod options;
 mod rest;
+mod rest_lengths;
 mod section;
 mod sensitivity;
 #[cfg(test)]

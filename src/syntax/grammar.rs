@@ -2,18 +2,33 @@
 //! "what was expected here" for what a catch-all rule took.
 
 use super::tree::{Kind, Node, fill};
-use pest::Parser;
 use pest::error::{ErrorVariant, InputLocation};
 use pest::iterators::Pair;
+use pest::{Parser, Token};
 
 #[derive(pest_derive::Parser)]
 #[grammar = "../grammar/mech.pest"]
 struct Mech;
 
-/// Parses a whole file. The grammar accepts every text; `None` would be a fault of the grammar.
+/// Parses a whole file, item by item: the parser's own list of a large file would not fit into the processor's caches.
+/// The grammar accepts every text; `None` would be a fault of the grammar.
 pub(super) fn tree(source: &str) -> Option<Node> {
-    let pair = Mech::parse(Rule::file, source).ok()?.next()?;
-    Some(node(pair, source))
+    let mut children = Vec::new();
+    let mut filled = 0;
+    // A byte order mark is filled in with the rest of what is no item.
+    let mut at = if source.starts_with('\u{FEFF}') { '\u{FEFF}'.len_utf8() } else { 0 };
+    while let Some(pair) = source.get(at..).and_then(|rest| Mech::parse(Rule::next_item, rest).ok()?.next()) {
+        let end = at + pair.as_span().end();
+        for child in nodes(pair, at, source) {
+            fill(source, filled..child.start as usize, &mut children);
+            filled = child.end as usize;
+            children.push(child);
+        }
+        at = end;
+    }
+    Mech::parse(Rule::rest_of_file, source.get(at..)?).ok()?;
+    fill(source, filled..source.len(), &mut children);
+    Some(Node { kind: Kind::File, start: 0, end: source.len() as u32, children: children.into() })
 }
 
 /// What a broken part should have been.
@@ -155,36 +170,58 @@ fn words(rule: Rule) -> String {
     text.into()
 }
 
-/// The node of a pair; bytes between its inner pairs become leaves.
-fn node(mut pair: Pair<'_, Rule>, source: &str) -> Node {
-    // `3` is a sum of one product of one …: such levels say nothing and would cost stack.
-    while matches!(pair.as_rule(), Rule::sum | Rule::product | Rule::unary | Rule::power) {
-        let mut inner = pair.clone().into_inner();
-        match (inner.next(), inner.next()) {
-            (Some(only), None) => pair = only,
-            _ => break,
-        }
-    }
-    let span = pair.as_span();
-    let (start, end) = (span.start(), span.end());
-    let kind = kind(pair.as_rule());
-    let mut children = Vec::new();
-    let mut at = start;
-    let mut inner = pair.into_inner().peekable();
-    let is_token = inner.peek().is_none() && is_token(kind);
-    for child in inner {
-        if matches!(child.as_rule(), Rule::EOI | Rule::line_end) {
+/// A pair whose parts are being collected.
+struct Open {
+    rule: Rule,
+    start: usize,
+    /// Place of its first part among the finished nodes.
+    first: usize,
+    /// No pair stands in it.
+    is_leaf: bool,
+}
+
+/// The nodes in a pair whose text begins at `base`; bytes between inner pairs become leaves. One walk over the parser's
+/// tokens: a node's parts are moved into a list of just their number.
+fn nodes(pair: Pair<'_, Rule>, base: usize, source: &str) -> Vec<Node> {
+    let mut open: Vec<Open> = Vec::new();
+    let mut finished: Vec<Node> = Vec::new();
+    let mut parts: Vec<Node> = Vec::new();
+    for token in pair.tokens() {
+        let (this, end) = match token {
+            Token::Start { rule, pos } => {
+                if let Some(outer) = open.last_mut() {
+                    outer.is_leaf = false;
+                }
+                let start = base + pos.pos();
+                open.push(Open { rule, start, first: finished.len(), is_leaf: true });
+                continue;
+            }
+            Token::End { pos, .. } => match open.pop() {
+                Some(this) => (this, base + pos.pos()),
+                None => break,
+            },
+        };
+        // `3` is a sum of one product of one …: such levels say nothing and would cost stack.
+        let is_level = matches!(this.rule, Rule::sum | Rule::product | Rule::unary | Rule::power);
+        if matches!(this.rule, Rule::EOI | Rule::line_end | Rule::next_item)
+            || is_level && finished.len() == this.first + 1
+        {
             continue;
         }
-        let child = node(child, source);
-        fill(source, at..child.start as usize, &mut children);
-        at = child.end as usize;
-        children.push(child);
+        let kind = kind(this.rule);
+        if !(this.is_leaf && is_token(kind)) {
+            let mut at = this.start;
+            for child in finished.drain(this.first..) {
+                fill(source, at..child.start as usize, &mut parts);
+                at = child.end as usize;
+                parts.push(child);
+            }
+            fill(source, at..end, &mut parts);
+        }
+        let children = parts.drain(..).collect();
+        finished.push(Node { kind, start: this.start as u32, end: end as u32, children });
     }
-    if !is_token {
-        fill(source, at..end, &mut children);
-    }
-    Node { kind, start: start as u32, end: end as u32, children }
+    finished
 }
 
 fn is_token(kind: Kind) -> bool {
@@ -206,7 +243,6 @@ fn is_token(kind: Kind) -> bool {
 
 fn kind(rule: Rule) -> Kind {
     match rule {
-        Rule::file => Kind::File,
         Rule::edition => Kind::Edition,
         Rule::import => Kind::Import,
         Rule::path => Kind::Path,

@@ -52,7 +52,7 @@ pub fn parse(file: u32, text: &str) -> Parse {
 fn unread(text: &str, diagnostic: Diagnostic) -> Parse {
     // Offsets are 32 bits wide: of a larger text the tree holds what it can count.
     let end = u32::try_from(text.len()).unwrap_or(u32::MAX);
-    let leaf = Node { kind: Kind::Junk, start: 0, end, children: Vec::new() };
-    let tree = Node { kind: Kind::File, start: 0, end, children: vec![leaf] };
+    let leaf = Node { kind: Kind::Junk, start: 0, end, children: Box::default() };
+    let tree = Node { kind: Kind::File, start: 0, end, children: Box::new([leaf]) };
     Parse { tree, file: ast::File::default(), diagnostics: vec![diagnostic] }
 }

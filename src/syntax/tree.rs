@@ -133,7 +133,7 @@ pub struct Node {
     /// One past the last byte.
     pub end: u32,
     /// Parts in order; empty for a leaf.
-    pub children: Vec<Node>,
+    pub children: Box<[Node]>,
 }
 
 impl Node {
@@ -202,7 +202,7 @@ pub(super) fn fill(source: &str, range: Range<usize>, into: &mut Vec<Node>) {
         let rest = source.get(at..range.end).unwrap_or("");
         let (kind, length) = trivia(rest);
         let length = length.max(1).min(range.end - at);
-        into.push(Node { kind, start: at as u32, end: (at + length) as u32, children: Vec::new() });
+        into.push(Node { kind, start: at as u32, end: (at + length) as u32, children: Box::default() });
         at += length;
     }
 }

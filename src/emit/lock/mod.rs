@@ -182,7 +182,8 @@ fn write_canonical(value: &Value, out: &mut String) {
     }
 }
 
-fn digest(bytes: &[u8]) -> String {
+/// `sha256:…` of some bytes.
+pub fn digest(bytes: &[u8]) -> String {
     let mut out = String::from("sha256:");
     for byte in Sha256::digest(bytes) {
         let _ = write!(out, "{byte:02x}");

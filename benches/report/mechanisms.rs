@@ -1,0 +1,86 @@
+//! The six mechanisms: a cycle, an iteration, a whole optimisation from the design's own start, the printed parts.
+
+use super::designs::{NAMES, example, layout, solved, starts};
+use super::{MILLI, Report, Time, WHOLE, once};
+use flexura::equilibrium::{Model, sweep};
+use flexura::ir::{Design, ExportKind};
+use flexura::optimize::Problem;
+use flexura::pipeline::{Compiler, EDGES, Stages};
+use std::sync::atomic::AtomicBool;
+
+fn size(design: &Design) -> String {
+    format!("{} rods, {} free, {} steps", design.rods.len(), design.free.len(), design.cycle.steps)
+}
+
+/// Rods and the equilibria of all states at the design's start, the conventional motion being known.
+pub fn cycles(report: &mut Report) {
+    for name in NAMES {
+        let mut sum = 0.0;
+        for design in &example(name).designs {
+            let (layout, start) = (layout(design), starts(design));
+            let time = report.time(|| {
+                let model = Model::new(design, &layout, &start, EDGES, false).expect("rods");
+                sweep(&model).expect("equilibria").states.len()
+            });
+            report.row("cycle", name, &size(design), time, MILLI);
+            sum += time.least * MILLI.0;
+        }
+        report.set("cycle_ms", name, Some(sum));
+    }
+}
+
+/// One cycle with the derivatives of all terms.
+pub fn iterations(report: &mut Report) {
+    for name in NAMES {
+        for design in &example(name).designs {
+            let layout = layout(design);
+            let problem = Problem::new(design, &layout, EDGES);
+            let x = problem.start();
+            let time = report.time(|| {
+                let trial = problem.simulate(&x).expect("the start can be simulated");
+                problem.differentiate(&trial).expect("and differentiated").gradient().len()
+            });
+            report.row("iteration", name, &size(design), time, MILLI);
+        }
+    }
+}
+
+/// As `flexura build --fresh` optimises.
+pub fn optimisations(report: &mut Report) {
+    for name in NAMES {
+        let (mut seconds, mut iterations, mut ended) = (0.0, 0, true);
+        let assembly = example(name);
+        for design in &assembly.designs {
+            let cancel = AtomicBool::new(false);
+            let solve = || Compiler::default().optimize(design, &starts(design), &|_| (), &cancel);
+            let (time, found) = once(solve);
+            seconds += time;
+            let solution = found.unwrap_or_else(|e| panic!("{name}: {e:?}")).solution;
+            iterations += solution.iterations;
+            ended &= solution.converged;
+        }
+        let what = format!("{name}, {iterations} iterations{}", if ended { "" } else { " (limit)" });
+        let time = Time { least: seconds, median: seconds };
+        report.row("optimise", &what, &size(&assembly.designs[0]), time, WHOLE);
+        report.set("optimise_s", name, Some(seconds));
+        report.set("iterations", name, Some(f64::from(u32::try_from(iterations).expect("few"))));
+    }
+}
+
+/// Printed parts of the solved design, its cycle included: links make way for what the flexures sweep.
+pub fn meshes(report: &mut Report) {
+    for name in NAMES {
+        let assembly = example(name);
+        if !assembly.exports.iter().any(|e| e.export.kind == ExportKind::Stl) {
+            continue;
+        }
+        let values = solved(name, &assembly);
+        let compiler = Compiler::default();
+        let mut bytes = 0;
+        let time = report.time(|| {
+            let (parts, _) = compiler.parts(&assembly, &values).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+            bytes = parts.iter().map(|p| p.bytes.len()).sum();
+        });
+        report.row("mesh", name, &format!("{:.1} MB of STL", bytes as f64 / 1e6), time, WHOLE);
+    }
+}
