@@ -5,6 +5,7 @@
 //! three numbers begins at 4k, θ_j is number 4j + 3; the half bandwidth is 10 throughout.
 
 use super::shear::ShearSystem;
+use super::expected::RodForces;
 use super::stencil::{Block, EdgeFrame, Local, VertexMeasures};
 use super::{Rod, RodState};
 use crate::math::Pose;
@@ -28,8 +29,17 @@ pub struct RodSystem {
     pub(crate) edge_gradient: Vec<Local>,
     pub(crate) edge_hessian: Vec<Block>,
     pub(crate) mixed: Vec<Block>,
-    /// Axial force EA ε per edge, N.
-    pub(crate) axial_force: Vec<f64>,
+    /// Of the last assembled state.
+    pub(crate) forces: RodForces,
+    /// What the next assembly, if `expecting`, or the last, unless `exact`, forms its geometric stiffness with.
+    pub(crate) expected: RodForces,
+    pub(crate) expecting: bool,
+    pub(crate) exact: bool,
+    /// Stiffness of each vertex by its measures, N·mm.
+    pub(crate) tangents: Vec<[f64; 3]>,
+    /// Scratch: a change of forces, and all coordinates of the rod in their banded order.
+    pub(crate) changing: RodForces,
+    pub(crate) coordinates: Vec<f64>,
     pub(crate) gradient: Vec<f64>,
     pub(crate) band: Vec<BandColumn>,
     /// Moment arms of x₁ and x_{N−1} from their link's centre.
@@ -46,6 +56,8 @@ pub struct RodSystem {
     pub(crate) condensed_hessian: SMatrix<f64, 12, 12>,
     pub(crate) solution: Vec<[f64; 1]>,
     pub(crate) increment: Vec<f64>,
+    /// Of the last back-substitution.
+    pub(crate) last_link: SVector<f64, 12>,
     pub(crate) columns: Option<Box<super::sensitivity::ParameterColumns>>,
     pub(crate) twist_scale: f64,
     /// Only for rods with shear.
@@ -95,7 +107,13 @@ impl RodSystem {
             edge_gradient: vec![[0.0; 4]; n],
             edge_hessian: vec![[[0.0; 4]; 4]; n],
             mixed: vec![[[0.0; 4]; 4]; n],
-            axial_force: vec![0.0; n],
+            forces: RodForces::zeros(n),
+            expected: RodForces::zeros(n),
+            expecting: false,
+            exact: true,
+            tangents: vec![[0.0; 3]; n],
+            changing: RodForces::zeros(n),
+            coordinates: vec![0.0; 4 * n + 3],
             gradient: vec![0.0; 4 * n + 3],
             band: vec![[0.0; COLUMN]; 4 * n + 3],
             arms: [Vector3::zeros(); 2],
@@ -109,6 +127,7 @@ impl RodSystem {
             condensed_hessian: SMatrix::zeros(),
             solution: vec![[0.0; 1]; internal + HALF_BANDWIDTH],
             increment: vec![0.0; internal],
+            last_link: SVector::zeros(),
             columns: None,
             twist_scale: 1.0,
             shear: (!rod.shear.is_empty()).then(|| Box::new(ShearSystem::new(n))),
@@ -172,6 +191,7 @@ impl RodSystem {
         let n = self.n;
         self.columns = None;
         self.factored = None;
+        self.exact = !std::mem::take(&mut self.expecting);
         self.twist_scale = rod.edge_length_mm();
         self.local_terms(rod, state);
         self.shear_terms(rod, state);
@@ -204,14 +224,14 @@ impl RodSystem {
         for (j, frame) in self.frames.iter().enumerate() {
             let mut g = [0.0; 4];
             let mut h = [[0.0; 4]; 4];
-            self.axial_force[j] = 0.0;
+            self.forces.axial[j] = 0.0;
             if j > 0 && j < n - 1 {
                 let stretch = frame.l - rod.edge_lengths[j];
                 let force = rod.ea[j] * stretch / rod.stretch_lengths[j];
-                self.axial_force[j] = force;
+                self.forces.axial[j] = force;
                 self.energy += 0.5 * force * stretch;
                 g[2] = force * frame.l;
-                h[0][0] = force * frame.l;
+                h[0][0] = if self.exact { force } else { self.expected.axial[j] } * frame.l;
                 h[1][1] = h[0][0];
                 h[2][2] = rod.ea[j] / rod.stretch_lengths[j] * frame.l * frame.l;
             }
@@ -221,8 +241,11 @@ impl RodSystem {
         for i in 1..n {
             let measures = VertexMeasures::new(&self.frames[i - 1], &self.frames[i]);
             let more = self.wagner_twisting(rod, i, &measures);
-            let term = measures.energy(&rod.vertex_stiffness[i], &rod.rest_measures[i], &more);
+            let expected = (!self.exact).then(|| &self.expected.moments[i]);
+            let term = measures.energy(&rod.vertex_stiffness[i], &rod.rest_measures[i], &more, expected);
             self.measures[i] = measures;
+            self.forces.moments[i] = term.moments;
+            self.tangents[i] = term.tangents;
             self.energy += term.energy;
             add_local(&mut self.edge_gradient[i - 1], &term.g_before);
             add_local(&mut self.edge_gradient[i], &term.g_after);
@@ -345,7 +368,16 @@ impl RodSystem {
             self.band[column][row - column]
         });
         let mut hessian = jacobian.transpose() * h * jacobian;
-        for (g, v) in [(g.fixed_rows::<3>(0), &r), (g.fixed_rows::<3>(4), &e)] {
+        let mut forces: [Vector3<f64>; 2] = [g.fixed_rows::<3>(0).into(), g.fixed_rows::<3>(4).into()];
+        if !self.exact {
+            // The free edge pulls at its vertex, the clamped one at itself.
+            let [free, clamped] = if end == 0 { [1, 0] } else { [n - 2, n - 1] };
+            for (force, j, sign) in [(0, free, if end == 0 { -1.0 } else { 1.0 }), (1, clamped, 1.0)] {
+                let [a, b, s, _] = self.expected_excess(j);
+                forces[force] += self.edge_basis(j) * Vector3::new(a, b, s) * sign;
+            }
+        }
+        for (g, v) in [(forces[0], &r), (forces[1], &e)] {
             let outer = g * v.transpose();
             let second = (outer + outer.transpose()) * 0.5 - Matrix3::identity() * g.dot(v);
             let mut block = hessian.fixed_view_mut::<3, 3>(3, 3);

@@ -187,6 +187,7 @@ impl RodSystem {
         let n = self.factors.order();
         let mut chain = *d_link;
         let extra = self.shear_increment(&mut chain);
+        self.last_link = *d_link;
         let d_link = &chain;
         for (x, y) in self.solution.iter_mut().zip(&self.reduced) {
             let mut sum = y[6];

@@ -56,6 +56,7 @@ mod centreline;
 mod condense;
 #[cfg(test)]
 mod derivative_tests;
+mod expected;
 mod options;
 mod rest;
 mod section;
@@ -75,6 +76,7 @@ pub use crate::ir::RodModel;
 pub use assemble::RodSystem;
 pub use centreline::CentrelineJacobian;
 pub use condense::FactorReport;
+pub use expected::RodForces;
 pub use options::{Corrections, RestFrames, RodOptions};
 pub use rest::{MIN_EDGES, PARAMETERS, RodError, RodParameters};
 pub use section::{RodMaterial, SectionShape, Stiffness, ellipse_stiffness, rectangle_stiffness};

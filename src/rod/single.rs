@@ -115,6 +115,7 @@ impl SingleRod {
             let b = self.pose_b.retract(&(d.fixed_rows::<3>(6) * step), &(d.fixed_rows::<3>(9) * step));
             outcome = self.rod.retract(&mut self.state, &scaled, &self.pose_a, &b);
             if outcome.is_ok() {
+                self.system.expect(&self.rod, scale);
                 self.pose_b = b;
                 return Ok(());
             }
@@ -174,6 +175,9 @@ impl SingleRod {
             let scale = self.system.largest_internal_force().max(least);
             let tolerance = RELATIVE_RESIDUAL * scale + self.system.rounding_floor(&self.rod, &self.state);
             if residual <= tolerance {
+                if !self.system.is_exact() {
+                    self.assemble();
+                }
                 self.report = Some(self.system.factor_unshifted());
                 self.system.condense();
                 return Ok(iteration);

@@ -67,6 +67,10 @@ pub(crate) struct VertexEnergy {
     pub after: Block,
     /// Rows: edge before; columns: edge after.
     pub mixed: Block,
+    /// Conjugate to the measures, N·mm.
+    pub moments: [f64; 3],
+    /// Their derivatives by the measures.
+    pub tangents: [f64; 3],
 }
 
 /// Energy of a vertex beyond ½ΣB(f − f̄)², a function of its twist, with its first and second derivative by it.
@@ -115,17 +119,29 @@ impl VertexMeasures {
     }
 
     /// Energy ½ΣB(f − f̄)² of this vertex, and `more` of its twist, with their derivatives; `b` are EI₁/l̄, EI₂/l̄,
-    /// GJ/l̄.
+    /// GJ/l̄. The geometric stiffness is that of the moments `expected`, or else of the present ones.
     #[inline]
-    pub(crate) fn energy(&self, b: &[f64; 3], rest: &[f64; 3], more: &Twisting) -> VertexEnergy {
+    pub(crate) fn energy(
+        &self,
+        b: &[f64; 3],
+        rest: &[f64; 3],
+        more: &Twisting,
+        expected: Option<&[f64; 3]>,
+    ) -> VertexEnergy {
         let mut m: [f64; 3] = std::array::from_fn(|i| b[i] * (self.value[i] - rest[i]));
         let energy = 0.5 * (0..3).map(|i| m[i] * (self.value[i] - rest[i])).sum::<f64>() + more.energy;
         m[2] += more.moment;
         let b = &[b[0], b[1], b[2] + more.tangent];
-        let sum = |g: &[Local; 3]| -> Local {
+        let sum = |m: &[f64; 3], g: &[Local; 3]| -> Local {
             std::array::from_fn(|i| m[0] * g[0][i] + m[1] * g[1][i] + m[2] * g[2][i])
         };
-        let (g0, g1) = (sum(&self.before), sum(&self.after));
+        let (g_before, g_after) = (sum(&m, &self.before), sum(&m, &self.after));
+        let moments = m;
+        let m = expected.unwrap_or(&m);
+        let (g0, g1) = match expected {
+            Some(m) => (sum(m, &self.before), sum(m, &self.after)),
+            None => (g_before, g_after),
+        };
         let d = &self.d;
         let (d11, d12, d13) = (d[0][0], d[0][1], d[0][2]);
         let (d21, d22, d23) = (d[1][0], d[1][1], d[1][2]);
@@ -213,6 +229,6 @@ impl VertexMeasures {
                     + r * (w01[i][j] - g0[i] * x1[j] - x0[i] * g1[j])
             })
         });
-        VertexEnergy { energy, g_before: g0, g_after: g1, before, after, mixed }
+        VertexEnergy { energy, g_before, g_after, before, after, mixed, moments, tangents: *b }
     }
 }
