@@ -123,6 +123,11 @@ impl RodSystem {
         self.expecting = true;
     }
 
+    /// Takes back what the next assembly was to expect.
+    pub fn forget_expected(&mut self) {
+        self.expecting = false;
+    }
+
     /// Whether the last assembly's Hessian is the exact one.
     pub fn is_exact(&self) -> bool {
         self.exact

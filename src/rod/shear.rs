@@ -242,10 +242,10 @@ impl RodSystem {
         report
     }
 
-    /// Increments of slip and force for the links' `d`, which becomes the chain's.
-    pub(crate) fn shear_increment(&self, d: &mut SVector<f64, 12>) -> Option<Vector6> {
+    /// Increments of slip and force for the links' `d`, which becomes the chain's, and for `share` of the gradient.
+    pub(crate) fn shear_increment(&self, d: &mut SVector<f64, 12>, share: f64) -> Option<Vector6> {
         let shear = self.shear.as_deref()?;
-        let extra = -(shear.inverse * (shear.gradient + shear.coupling * *d));
+        let extra = -(shear.inverse * (shear.gradient * share + shear.coupling * *d));
         let mut b = d.fixed_rows_mut::<3>(6);
         b -= extra.fixed_rows::<3>(0);
         Some(extra)
