@@ -23,6 +23,9 @@ pub(crate) const FREEDOMS: usize = 6;
 /// First shift of the slip's block relative to its diagonal, its growth, and the most tries.
 const SHIFTS: (f64, f64, usize) = (1e-3, 8.0, 24);
 
+/// Pivots of slip and force below this part of the largest entry are not trusted with their sign.
+const NEAR_ZERO: f64 = 1e-10;
+
 type Vector6 = SVector<f64, FREEDOMS>;
 type Matrix6 = SMatrix<f64, FREEDOMS, FREEDOMS>;
 /// Derivatives of slip and force by the 12 link freedoms and the parameters.
@@ -47,6 +50,27 @@ pub(crate) struct ShearSystem {
     gradient: Vector6,
     coupling: SMatrix<f64, FREEDOMS, 12>,
     inverse: Matrix6,
+}
+
+/// Number of negative eigenvalues, by the signs of the pivots (Sylvester) where none is near zero.
+fn negative(m: &Matrix6) -> usize {
+    let mut a = *m;
+    let least = NEAR_ZERO * m.amax();
+    let mut count = 0;
+    for k in 0..FREEDOMS {
+        let pivot = a[(k, k)];
+        if pivot.is_nan() || pivot.abs() <= least {
+            return m.symmetric_eigenvalues().iter().filter(|e| **e < 0.0).count();
+        }
+        count += usize::from(pivot < 0.0);
+        for j in k + 1..FREEDOMS {
+            let l = a[(j, k)] / pivot;
+            for i in j..FREEDOMS {
+                a[(i, j)] -= a[(i, k)] * l;
+            }
+        }
+    }
+    count
 }
 
 impl ShearSystem {
@@ -206,7 +230,6 @@ impl RodSystem {
         // To one unit: F in units of the rod's shear stiffness times a length.
         let scale = Vector6::from_fn(|i, _| if i < 3 { 1.0 } else { 1.0 / shear.compliance });
         let scaled = Matrix6::from_fn(|i, j| block[(i, j)] * scale[i] * scale[j]);
-        let negative = |m: &Matrix6| m.symmetric_eigenvalues().iter().filter(|e| **e < 0.0).count();
         let count = negative(&scaled);
         report.negative_pivots = (report.negative_pivots + count).saturating_sub(3);
         let mut used = scaled;
