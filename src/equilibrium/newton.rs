@@ -201,7 +201,7 @@ impl Solver {
                 return Err(SolveError::NotFinite);
             }
             if residual.small() {
-                if self.systems.iter().any(|s| !s.is_exact()) {
+                if self.systems.iter().any(|s| !s.is_exact(residual.tolerance_n)) {
                     self.assemble(model, &mut state, target);
                 }
                 let stable = self.factor(model, &state, true);

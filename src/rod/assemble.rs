@@ -25,6 +25,8 @@ pub struct RodSystem {
     pub(crate) n: usize,
     pub(crate) energy: f64,
     pub(crate) frames: Vec<EdgeFrame>,
+    /// See [`Self::edge_basis`].
+    pub(crate) bases: Vec<Matrix3<f64>>,
     pub(crate) measures: Vec<VertexMeasures>,
     pub(crate) edge_gradient: Vec<Local>,
     pub(crate) edge_hessian: Vec<Block>,
@@ -103,6 +105,7 @@ impl RodSystem {
             n,
             energy: 0.0,
             frames: vec![EdgeFrame::ZERO; n],
+            bases: vec![Matrix3::zeros(); n],
             measures: vec![VertexMeasures::ZERO; n],
             edge_gradient: vec![[0.0; 4]; n],
             edge_hessian: vec![[[0.0; 4]; 4]; n],
@@ -221,6 +224,9 @@ impl RodSystem {
         for ((frame, x), m1) in zipped {
             *frame = EdgeFrame::new(&x[0], &x[1], m1);
         }
+        for (basis, f) in self.bases.iter_mut().zip(&self.frames) {
+            *basis = Matrix3::from_columns(&[f.m1, f.m2, f.t]) * (1.0 / f.l);
+        }
         for (j, frame) in self.frames.iter().enumerate() {
             let mut g = [0.0; 4];
             let mut h = [[0.0; 4]; 4];
@@ -258,8 +264,7 @@ impl RodSystem {
 
     /// Columns of the map from a local to a spatial covector of edge `j`: (m₁, m₂, t)/|e|.
     pub(crate) fn edge_basis(&self, j: usize) -> Matrix3<f64> {
-        let f = &self.frames[j];
-        Matrix3::from_columns(&[f.m1, f.m2, f.t]) / f.l
+        self.bases[j]
     }
 
     /// Adds gradient and diagonal block of edge `j` to the banded system.
@@ -275,32 +280,26 @@ impl RodSystem {
         );
         let block = basis * sym * basis.transpose();
         let turn = basis * Vector3::new(h[3][0], h[3][1], h[3][2]);
-        let signs = slot_signs(j, self.n);
-        let theta = 4 * j + 3;
-        self.gradient[theta] += g[3];
-        self.band[theta][0] += h[3][3];
-        for (s, sign) in signs.into_iter().enumerate() {
-            if sign == 0.0 {
-                continue;
-            }
-            let slot = 4 * (j + s);
-            for c in 0..3 {
-                self.gradient[slot + c] += sign * force[c];
-                for r in c..3 {
-                    self.band[slot + c][r - c] += block[(r, c)];
-                }
-                // θ_j comes after slot j and before slot j + 1.
-                let (row, column) = if s == 0 { (theta, slot + c) } else { (slot + c, theta) };
-                self.band[column][row - column] += sign * turn[c];
-            }
+        let [s0, s1] = slot_signs(j, self.n);
+        // Slot j, θ_j, slot j + 1.
+        let Some(to) = self.gradient[4 * j..].first_chunk_mut::<7>() else { return };
+        to[3] += g[3];
+        for c in 0..3 {
+            to[c] += s0 * force[c];
+            to[4 + c] += s1 * force[c];
         }
-        let both = signs[0] * signs[1];
-        if both != 0.0 {
-            for c in 0..3 {
-                for r in 0..3 {
-                    self.band[4 * j + c][4 + r - c] += both * block[(r, c)];
-                }
+        let Some(to) = self.band[4 * j..].first_chunk_mut::<7>() else { return };
+        to[3][0] += h[3][3];
+        for c in 0..3 {
+            for r in c..3 {
+                to[c][r - c] += s0 * s0 * block[(r, c)];
+                to[4 + c][r - c] += s1 * s1 * block[(r, c)];
             }
+            for r in 0..3 {
+                to[c][4 + r - c] += s0 * s1 * block[(r, c)];
+            }
+            to[c][3 - c] += s0 * turn[c];
+            to[3][1 + c] += s1 * turn[c];
         }
     }
 
@@ -313,39 +312,22 @@ impl RodSystem {
         let block = basis1 * inner.transpose() * basis0.transpose();
         let turn0 = basis1 * Vector3::new(m[3][0], m[3][1], m[3][2]);
         let turn1 = basis0 * Vector3::new(m[0][3], m[1][3], m[2][3]);
-        let (s0, s1) = (slot_signs(i - 1, self.n), slot_signs(i, self.n));
-        let (theta0, theta1) = (4 * i - 1, 4 * i + 3);
-        self.band[theta0][4] += m[3][3];
-        for (a, sign) in s1.into_iter().enumerate() {
-            // θ_{i−1} with the slots of edge i.
-            let slot = 4 * (i + a);
-            for c in 0..3 {
-                self.band[theta0][slot + c - theta0] += sign * turn0[c];
+        let ([a, b], [c, d]) = (slot_signs(i - 1, self.n), slot_signs(i, self.n));
+        // Slot i − 1, θ_{i−1}, slot i, θ_i, slot i + 1.
+        let Some(to) = self.band[4 * i - 4..].first_chunk_mut::<11>() else { return };
+        to[3][4] += m[3][3];
+        for k in 0..3 {
+            to[3][1 + k] += c * turn0[k];
+            to[3][5 + k] += d * turn0[k];
+            to[k][7 - k] += a * turn1[k];
+            to[4 + k][3 - k] += b * turn1[k];
+            for r in 0..3 {
+                to[k][4 + r - k] += a * c * block[(r, k)];
+                to[k][8 + r - k] += a * d * block[(r, k)];
+                to[4 + k][4 + r - k] += b * d * block[(r, k)];
             }
-        }
-        for (a, sign) in s0.into_iter().enumerate() {
-            // θ_i with the slots of edge i − 1.
-            let slot = 4 * (i - 1 + a);
-            for c in 0..3 {
-                self.band[slot + c][theta1 - slot - c] += sign * turn1[c];
-            }
-        }
-        for (a, sign1) in s1.into_iter().enumerate() {
-            for (b, sign0) in s0.into_iter().enumerate() {
-                let sign = sign0 * sign1;
-                if sign == 0.0 {
-                    continue;
-                }
-                let (row, column) = (4 * (i + a), 4 * (i - 1 + b));
-                for c in 0..3 {
-                    for r in 0..3 {
-                        if row > column {
-                            self.band[column + c][row + r - column - c] += sign * block[(r, c)];
-                        } else if r >= c {
-                            self.band[column + c][r - c] += sign * (block[(r, c)] + block[(c, r)]);
-                        }
-                    }
-                }
+            for r in k..3 {
+                to[4 + k][r - k] += b * c * (block[(r, k)] + block[(k, r)]);
             }
         }
     }

@@ -214,7 +214,7 @@ impl SingleRod {
             let scale = self.system.largest_internal_force().max(least);
             let tolerance = RELATIVE_RESIDUAL * scale + self.system.rounding_floor(&self.rod, &self.state);
             if residual <= tolerance {
-                if !self.system.is_exact() {
+                if !self.system.is_exact(tolerance) {
                     self.assemble();
                 }
                 self.report = Some(self.system.factor_unshifted());

@@ -34,7 +34,7 @@ impl EdgeFrame {
     pub(crate) fn new(x0: &Vector3<f64>, x1: &Vector3<f64>, m1: &Vector3<f64>) -> Self {
         let e = x1 - x0;
         let l = e.norm();
-        let t = e / l;
+        let t = e * (1.0 / l);
         Self { t, m1: *m1, m2: t.cross(m1), l }
     }
 }
