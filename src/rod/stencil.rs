@@ -81,6 +81,25 @@ pub(crate) struct Twisting {
     pub tangent: f64,
 }
 
+/// Local coordinates by which the measures have derivatives: all but the stretch σ.
+const TURNING: [usize; 3] = [0, 1, 3];
+
+/// Lower triangle of Σ s gᵀ + r (w − gr xᵀ − x grᵀ), where s, g, gr and x have no part along σ.
+#[inline(always)]
+fn lower(w: &Block, s: &[Local; 3], g: &[Local; 3], gr: &Local, x: &Local, r: f64) -> Block {
+    let mut out = [[0.0; 4]; 4];
+    for i in TURNING {
+        for j in TURNING.into_iter().filter(|j| *j <= i) {
+            out[i][j] = s[0][i] * g[0][j]
+                + s[1][i] * g[1][j]
+                + s[2][i] * g[2][j]
+                + r * (w[i][j] - gr[i] * x[j] - x[i] * gr[j]);
+        }
+    }
+    out[2] = w[2].map(|w| r * w);
+    out
+}
+
 impl VertexMeasures {
     pub(crate) const ZERO: Self = Self {
         value: [0.0; 3],
@@ -207,28 +226,17 @@ impl VertexMeasures {
         let (x0, x1) = ([d13, d23, 0.0, 0.0], [d31, d32, 0.0, 0.0]);
         let scaled = |g: &[Local; 3]| -> [Local; 3] { std::array::from_fn(|f| g[f].map(|v| b[f] * v)) };
         let (s0, s1) = (scaled(&self.before), scaled(&self.after));
-        let lower = |w: &Block, s: &[Local; 3], g: &[Local; 3], gr: &Local, x: &Local| -> Block {
-            let mut out = [[0.0; 4]; 4];
-            for i in 0..4 {
-                for j in 0..=i {
-                    out[i][j] = s[0][i] * g[0][j]
-                        + s[1][i] * g[1][j]
-                        + s[2][i] * g[2][j]
-                        + r * (w[i][j] - gr[i] * x[j] - x[i] * gr[j]);
-                }
-            }
-            out
-        };
-        let before = lower(&w0, &s0, &self.before, &g0, &x0);
-        let after = lower(&w1, &s1, &self.after, &g1, &x1);
-        let mixed = std::array::from_fn(|i| {
-            std::array::from_fn(|j| {
-                s0[0][i] * self.after[0][j]
+        let before = lower(&w0, &s0, &self.before, &g0, &x0, r);
+        let after = lower(&w1, &s1, &self.after, &g1, &x1, r);
+        let mut mixed = [[0.0; 4]; 4];
+        for i in TURNING {
+            for j in TURNING {
+                mixed[i][j] = s0[0][i] * self.after[0][j]
                     + s0[1][i] * self.after[1][j]
                     + s0[2][i] * self.after[2][j]
-                    + r * (w01[i][j] - g0[i] * x1[j] - x0[i] * g1[j])
-            })
-        });
+                    + r * (w01[i][j] - g0[i] * x1[j] - x0[i] * g1[j]);
+            }
+        }
         VertexEnergy { energy, g_before, g_after, before, after, mixed, moments, tangents: *b }
     }
 }
