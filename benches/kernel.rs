@@ -86,7 +86,9 @@ fn iteration(edges: usize) -> [f64; 6] {
 }
 
 fn rod() {
-    println!("\n## One rod\n\nParts of a Newton iteration, µs per edge; the whole has the free end's 6 × 6 system besides.\n");
+    println!(
+        "\n## One rod\n\nParts of a Newton iteration, µs per edge; the whole has the free end's 6 × 6 system besides.\n"
+    );
     println!("| edges | assembly | factors | condensation | back-substitution | whole | retraction |");
     println!("| --- | --- | --- | --- | --- | --- | --- |");
     for edges in [20, 50, 100, 200, 500, 1000] {
@@ -118,7 +120,28 @@ fn rod() {
             iterations += s.move_b(&Vector3::zeros(), &(Vector3::z() * 1f64.to_radians())).unwrap();
         }
     });
-    println!("\nHinge about the middle, 60 steps of 1°, 20 edges: {:.3} ms, {iterations} iterations.", time * 1e3);
+    println!(
+        "\nHinge about the middle, 60 steps of 1°, 20 edges: {:.3} ms, {iterations} iterations.",
+        time * 1e3
+    );
+}
+
+/// Of a bent rod, the gradient of a functional by all rest lengths with the factors at hand, µs.
+fn adjoint() {
+    let middle = Vector3::x() * (LENGTH_MM / 2.0);
+    let mut s = SingleRod::new(benchmark(20), middle, middle);
+    for _ in 0..30 {
+        s.move_b(&Vector3::zeros(), &(Vector3::z() * 1f64.to_radians())).unwrap();
+    }
+    let w = vec![1.0; s.rod.internal_freedoms()];
+    let mut gradient = vec![0.0; s.rod.edges()];
+    let time = least(0.5, || {
+        for _ in 0..200 {
+            s.system.rest_length_gradient(&s.rod, black_box(&w), &mut gradient).unwrap();
+            black_box(&gradient);
+        }
+    });
+    println!("\nGradient by all rest lengths, 20 edges: {:.2} µs.", time / 200.0 * 1e6);
 }
 
 struct Folder(PathBuf);
@@ -203,6 +226,7 @@ fn main() {
     println!("# The numerical core");
     if wants("rod") {
         rod();
+        adjoint();
     }
     if wants("cycle") {
         cycle(&design(&path));

@@ -69,7 +69,13 @@ impl History {
     }
 
     /// Adds the tangents of the state that `solver` solved last, reached by a change of controls.
-    pub(super) fn add(&mut self, model: &Model, solver: &mut Solver, equilibrium: &Equilibrium, change: &[f64]) {
+    pub(super) fn add(
+        &mut self,
+        model: &Model,
+        solver: &mut Solver,
+        equilibrium: &Equilibrium,
+        change: &[f64],
+    ) {
         let corner = || {
             let product: f64 = change.iter().zip(&self.last_change).map(|(a, b)| a * b).sum();
             product < CORNER * length(change) * length(&self.last_change)

@@ -250,16 +250,18 @@ fn eliminate_one(a: &mut DMatrix<f64>, k: usize, inertia: &mut Inertia) {
     } else {
         inertia.negative += 1;
     }
-    for j in k + 1..n {
-        let w = a[(j, k)] / d;
+    let (left, right) = a.as_mut_slice().split_at_mut((k + 1) * n);
+    let pivot = &mut left[k * n..];
+    for (j, column) in (k + 1..n).zip(right.chunks_exact_mut(n)) {
+        let w = pivot[j] / d;
         if w != 0.0 {
-            for i in j..n {
-                a[(i, j)] -= a[(i, k)] * w;
+            for (to, from) in column[j..].iter_mut().zip(&pivot[j..]) {
+                *to -= from * w;
             }
         }
     }
-    for i in k + 1..n {
-        a[(i, k)] /= d;
+    for v in &mut pivot[k + 1..] {
+        *v /= d;
     }
 }
 
@@ -276,16 +278,17 @@ fn eliminate_two(a: &mut DMatrix<f64>, k: usize, inertia: &mut Inertia) {
     } else {
         inertia.negative += 2;
     }
-    for j in k + 2..n {
-        let (x, y) = (a[(j, k)], a[(j, k + 1)]);
+    let (left, right) = a.as_mut_slice().split_at_mut((k + 2) * n);
+    let (first, second) = left[k * n..].split_at_mut(n);
+    for (j, column) in (k + 2..n).zip(right.chunks_exact_mut(n)) {
+        let (x, y) = (first[j], second[j]);
         let w = ((f / e) * (x / e) - y / e) / determinant;
         let v = ((d / e) * (y / e) - x / e) / determinant;
-        for i in j..n {
-            a[(i, j)] -= a[(i, k)] * w + a[(i, k + 1)] * v;
+        for ((to, p), q) in column[j..].iter_mut().zip(&first[j..]).zip(&second[j..]) {
+            *to -= p * w + q * v;
         }
-        // Column k of row j is not read again by later j.
-        a[(j, k)] = w;
-        a[(j, k + 1)] = v;
+        // Row j of these columns is not read again by later j.
+        (first[j], second[j]) = (w, v);
     }
 }
 

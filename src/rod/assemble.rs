@@ -4,8 +4,8 @@
 //! θ₁, x₂, θ₂, …, x_{N−2}, θ_{N−2} (internal), x_{N−1}, θ_{N−1}, e_{N−1} (what link B carries). Slot k of
 //! three numbers begins at 4k, θ_j is number 4j + 3; the half bandwidth is 10 throughout.
 
-use super::shear::ShearSystem;
 use super::expected::RodForces;
+use super::shear::ShearSystem;
 use super::stencil::{Block, EdgeFrame, Local, VertexMeasures};
 use super::{Rod, RodState};
 use crate::math::Pose;

@@ -86,11 +86,8 @@ impl RodSystem {
             let f = &self.frames[j];
             let r = 1.0 / f.l;
             let local = [f.m1.dot(&e) * r, f.m2.dot(&e) * r, f.t.dot(&e) * r, all[4 * j + 3]];
-            out.axial[j] = if j > 0 && j < n - 1 {
-                rod.ea[j] / rod.stretch_lengths[j] * f.l * local[2]
-            } else {
-                0.0
-            };
+            out.axial[j] =
+                if j > 0 && j < n - 1 { rod.ea[j] / rod.stretch_lengths[j] * f.l * local[2] } else { 0.0 };
             if j > 0 {
                 let m = &self.measures[j];
                 let stiffness = &self.tangents[j];

@@ -51,6 +51,7 @@
 //! three-dimensional finite elements. With shear, six internal freedoms more (`shear.rs`), nothing else changes
 //! for the caller.
 
+mod adjoint;
 mod assemble;
 mod centreline;
 mod condense;

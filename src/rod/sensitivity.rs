@@ -45,6 +45,8 @@ pub enum SensitivityError {
     NoColumns,
     /// A matrix has the wrong number of rows or columns.
     Shape,
+    /// Only rods without shear and Wagner's strain have them.
+    Corrected,
 }
 
 impl std::fmt::Display for SensitivityError {
@@ -52,6 +54,7 @@ impl std::fmt::Display for SensitivityError {
         f.write_str(match self {
             Self::NoDerivatives => "the rod was built without derivatives",
             Self::NoColumns => "parameter columns were not computed for this state",
+            Self::Corrected => "only rods without shear and Wagner's strain have this derivative",
             Self::Shape => "a sensitivity matrix has the wrong shape",
         })
     }

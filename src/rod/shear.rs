@@ -197,8 +197,7 @@ impl RodSystem {
         let mut hessian = shear.force_hessian;
         let mut gradient = shear.force_gradient;
         let inverse = self.factors.inverse_pivots();
-        for (i, ((y, z), d)) in shear.reduced.iter().zip(&self.reduced).zip(inverse).enumerate() {
-            let b = i.checked_sub(n - END_COUPLING).and_then(|k| self.reduced_b.get(k));
+        for ((y, z), d) in shear.reduced.iter().zip(&self.reduced).zip(inverse) {
             for k in 0..3 {
                 let s = y[k] * d;
                 gradient[k] -= s * z[6];
@@ -208,8 +207,14 @@ impl RodSystem {
                 for r in 0..6 {
                     by_force[(r, k)] -= s * z[r];
                 }
-                for r in 0..b.map_or(0, |b| b.len()) {
-                    by_force[(6 + r, k)] -= s * b.map_or(0.0, |b| b[r]);
+            }
+        }
+        let last = n - END_COUPLING..n;
+        for ((y, z), d) in shear.reduced[last.clone()].iter().zip(&self.reduced_b).zip(&inverse[last]) {
+            for k in 0..3 {
+                let s = y[k] * d;
+                for r in 0..6 {
+                    by_force[(6 + r, k)] -= s * z[r];
                 }
             }
         }

@@ -13,7 +13,9 @@ mod track;
 
 pub use soft_maximum::{Level, Sampled, SoftForm};
 
-use crate::equilibrium::{Equilibrium, Layout, Model, PointForce, PointForceChange, Sensitivity, SensitivityWorkspace};
+use crate::equilibrium::{
+    Equilibrium, Layout, Model, PointForce, PointForceChange, Sensitivity, SensitivityWorkspace,
+};
 use crate::geometry::SkeletonCapsule;
 use crate::ir::{Design, ObjectiveKind};
 use crate::math::skew;
