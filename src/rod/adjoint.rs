@@ -81,7 +81,7 @@ mod tests {
     use super::super::{Rod, RodMaterial, RodParameters};
     use nalgebra::Vector3;
 
-    /// Of five points of the difference quotient of fourth order, at 1e-3 of a rest length: measured 2e-9.
+    /// Of five points of the difference quotient of fourth order, at 1e-3 of a rest length: measured 3.4e-10.
     const AGREES: f64 = 1e-7;
 
     /// A curved rod with one rest length off by `by`, bent to the same place.
