@@ -13,6 +13,7 @@ mod layout;
 mod load;
 mod model;
 mod newton;
+mod predict;
 mod saddle;
 mod sensitivity;
 mod sweep;

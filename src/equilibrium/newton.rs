@@ -14,8 +14,11 @@ use nalgebra::DVector;
 const RESIDUAL: f64 = 1e-9;
 /// Constraints of an accepted state, mm (levers times radians for directions and angles).
 const CONSTRAINT_MM: f64 = 1e-9;
-/// Newton iterations before a step counts as failed. Accepted steps take 2 to 8.
+/// Newton iterations before a solution counts as failed.
 const ITERATIONS: usize = 40;
+/// The same of a step of a sweep, which can be cut: small ones take 1 to 3, steps of 30 degrees up to 5. What takes longer
+/// may have wandered off to another branch.
+const STEP_ITERATIONS: usize = 10;
 /// Largest rotation of a link in one iteration, rad: beyond it the chart's linearisation is poor.
 const ROTATION_STEP_RAD: f64 = 0.4;
 /// Largest displacement of a link in one iteration, in lever lengths.
@@ -153,13 +156,54 @@ impl Solver {
         self.loads.clear();
         self.loads.extend_from_slice(loads);
         self.take_sizes(model, target);
-        let mut state = state;
-        for iteration in 0..ITERATIONS {
+        self.iterate(model, state, target, ITERATIONS)
+    }
+
+    /// As [`Self::solve`] from a predicted `state`, near enough to be reached in a few iterations.
+    ///
+    /// # Errors
+    /// As [`Self::solve`].
+    pub(super) fn correct(
+        &mut self,
+        model: &Model,
+        state: State,
+        target: &[f64],
+    ) -> Result<Equilibrium, SolveError> {
+        self.loads.clear();
+        self.take_sizes(model, target);
+        self.iterate(model, state, target, STEP_ITERATIONS)
+    }
+
+    fn iterate(
+        &mut self,
+        model: &Model,
+        state: State,
+        target: &[f64],
+        limit: usize,
+    ) -> Result<Equilibrium, SolveError> {
+        let found = self.iterations(model, state, target, limit);
+        if found.is_err() {
+            self.systems.iter_mut().for_each(RodSystem::forget_expected);
+        }
+        found
+    }
+
+    fn iterations(
+        &mut self,
+        model: &Model,
+        mut state: State,
+        target: &[f64],
+        limit: usize,
+    ) -> Result<Equilibrium, SolveError> {
+        for iteration in 0..limit {
             let residual = self.assemble(model, &mut state, target);
             if !(residual.force_n.is_finite() && residual.constraint_mm.is_finite()) {
                 return Err(SolveError::NotFinite);
             }
             if residual.small() {
+                if self.systems.iter().any(|s| !s.is_exact(residual.tolerance_n)) {
+                    self.assemble(model, &mut state, target);
+                }
                 let stable = self.factor(model, &state, true);
                 let energy_n_mm = self.systems.iter().map(|s| s.energy()).sum();
                 let strains = model.rods.iter().zip(&self.systems).map(|(r, s)| s.strains(&r.rod)).collect();
@@ -253,49 +297,69 @@ impl Solver {
     }
 
     /// Moves the state along `step` (links, multipliers) with the rods following.
-    pub(super) fn advance(
+    fn advance(
         &mut self,
         model: &Model,
         state: &mut State,
         step: &DVector<f64>,
         fraction: f64,
     ) -> Result<(), SolveError> {
-        let n = model.layout.dofs();
+        let inside: Vec<Vec<f64>> = model
+            .rods
+            .iter()
+            .zip(&mut self.systems)
+            .map(|(rod, system)| system.back_substitute(&gather(model, rod.bodies, step)).to_vec())
+            .collect();
         let mut fraction = fraction;
         // A frame that would turn by more than a right angle leaves the branch of its twist: shorten.
         for _ in 0..8 {
-            let mut next = state.clone();
-            for (pose, body) in next.poses.iter_mut().zip(&model.layout.bodies) {
-                if let Some(first) = body.first_dof {
-                    let d = step.fixed_rows::<6>(first) * fraction;
-                    *pose = pose.retract(&d.fixed_rows::<3>(0).into(), &d.fixed_rows::<3>(3).into());
-                }
-            }
-            let mut turned = false;
-            for ((rod, system), rod_state) in model.rods.iter().zip(&mut self.systems).zip(&mut next.rods) {
-                let d_link = gather(model, rod.bodies, step);
-                let mut internal = system.back_substitute(&d_link).to_vec();
-                internal.iter_mut().for_each(|v| *v *= fraction);
-                let [a, b] = rod.bodies;
-                turned |= rod.rod.retract(rod_state, &internal, &next.poses[a], &next.poses[b]).is_err();
-            }
-            if !turned {
-                for (l, d) in next.lambda.iter_mut().zip(step.rows(n, model.rows()).iter()) {
-                    *l += fraction * d;
-                }
-                for (value, drive) in next.drives.iter_mut().zip(&model.layout.drives) {
-                    *value = drive.joint.value(&next.poses, *value);
-                }
-                for (turn, load) in next.turns.iter_mut().zip(&model.layout.loads) {
-                    *turn = load.turn(&next.poses, *turn);
-                }
+            if let Some(next) = moved(model, state, step, &inside, fraction) {
                 *state = next;
+                for (rod, system) in model.rods.iter().zip(&mut self.systems) {
+                    system.expect(&rod.rod, fraction);
+                }
                 return Ok(());
             }
             fraction *= 0.5;
         }
         Err(SolveError::NotConverged)
     }
+}
+
+/// The state moved by a fraction of increments of links and multipliers (`step`) and of each rod's inside; none where a
+/// rod cannot follow.
+pub(super) fn moved(
+    model: &Model,
+    state: &State,
+    step: &DVector<f64>,
+    inside: &[Vec<f64>],
+    fraction: f64,
+) -> Option<State> {
+    let n = model.layout.dofs();
+    let mut next = state.clone();
+    for (pose, body) in next.poses.iter_mut().zip(&model.layout.bodies) {
+        if let Some(first) = body.first_dof {
+            let d = step.fixed_rows::<6>(first) * fraction;
+            *pose = pose.retract(&d.fixed_rows::<3>(0).into(), &d.fixed_rows::<3>(3).into());
+        }
+    }
+    let mut scaled = Vec::new();
+    for ((rod, internal), rod_state) in model.rods.iter().zip(inside).zip(&mut next.rods) {
+        scaled.clear();
+        scaled.extend(internal.iter().map(|v| v * fraction));
+        let [a, b] = rod.bodies;
+        rod.rod.retract(rod_state, &scaled, &next.poses[a], &next.poses[b]).ok()?;
+    }
+    for (l, d) in next.lambda.iter_mut().zip(step.rows(n, model.rows()).iter()) {
+        *l += fraction * d;
+    }
+    for (value, drive) in next.drives.iter_mut().zip(&model.layout.drives) {
+        *value = drive.joint.value(&next.poses, *value);
+    }
+    for (turn, load) in next.turns.iter_mut().zip(&model.layout.loads) {
+        *turn = load.turn(&next.poses, *turn);
+    }
+    Some(next)
 }
 
 fn step_fraction(model: &Model, step: &DVector<f64>) -> f64 {

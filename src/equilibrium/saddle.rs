@@ -129,6 +129,18 @@ impl Solver {
         }
         rhs.component_mul_assign(&self.scale);
     }
+
+    /// The same for every column.
+    pub(super) fn solve_scaled_block(&self, rhs: &mut DMatrix<f64>) {
+        let scale = |rhs: &mut DMatrix<f64>| {
+            rhs.column_iter_mut().for_each(|mut c| c.component_mul_assign(&self.scale));
+        };
+        scale(rhs);
+        if let Some(f) = &self.factors {
+            f.solve_in_place(rhs);
+        }
+        scale(rhs);
+    }
 }
 
 /// Adds a 12-vector of two bodies into the link vector.

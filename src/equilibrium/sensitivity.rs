@@ -6,7 +6,7 @@ use super::load::{PointForce, PointForceChange};
 use super::model::{Model, State};
 use super::newton::{Equilibrium, SolveError, Solver};
 use super::saddle::scatter;
-use crate::rod::{CentrelineJacobian, PARAMETERS, StrainJacobian};
+use crate::rod::{CentrelineJacobian, StrainJacobian};
 use nalgebra::{DMatrix, DVector};
 
 /// First derivatives of one equilibrium by the n design parameters.
@@ -17,10 +17,6 @@ pub struct Sensitivity {
     pub links: DMatrix<f64>,
     /// Multipliers, rows × n.
     pub lambda: DMatrix<f64>,
-    /// Per rod its own 31 directions (12 link increments, 19 parameters) by the n, 31 × n.
-    pub directions: Vec<DMatrix<f64>>,
-    /// Per rod its strain measures with their derivatives by those 31 directions.
-    pub strains: Vec<StrainJacobian>,
     /// Per rod where it is, by the n; empty unless asked for ([`SensitivityWorkspace::with_centrelines`]).
     pub centrelines: Vec<CentrelineJacobian>,
 }
@@ -116,37 +112,29 @@ impl SensitivityWorkspace {
             let mut column = rhs.column_mut(change.parameter);
             column -= by;
         }
-        for mut column in rhs.column_iter_mut() {
-            let mut v: DVector<f64> = column.clone_owned();
-            solver.solve_scaled(&mut v);
-            column.copy_from(&v);
-        }
-        let mut directions = Vec::with_capacity(model.rods.len());
-        let mut strains = Vec::with_capacity(model.rods.len());
+        solver.solve_scaled_block(&mut rhs);
         let mut centrelines = Vec::new();
-        for (rod, system) in model.rods.iter().zip(&solver.systems) {
-            let mut own = DMatrix::zeros(12 + PARAMETERS, parameters);
+        for (rod, system) in model.rods.iter().zip(&solver.systems).filter(|_| self.centrelines) {
+            let mut links = DMatrix::zeros(12, parameters);
             for (half, body) in rod.bodies.into_iter().enumerate() {
                 if let Some(first) = model.layout.bodies[body].first_dof {
-                    own.rows_mut(6 * half, 6).copy_from(&rhs.rows(first, 6));
+                    links.rows_mut(6 * half, 6).copy_from(&rhs.rows(first, 6));
                 }
             }
-            own.rows_mut(12, PARAMETERS).copy_from(&rod.dq_dp);
-            if self.centrelines {
-                let links = own.rows(0, 12).into_owned();
-                let jacobian = system.centreline_jacobian(&rod.rod, &links, &rod.dq_dp);
-                centrelines.push(jacobian.map_err(|_| SolveError::NoDerivatives)?);
-            }
-            directions.push(own);
-            strains.push(system.strain_jacobian(&rod.rod).map_err(|_| SolveError::NoDerivatives)?);
+            let jacobian = system.centreline_jacobian(&rod.rod, &links, &rod.dq_dp);
+            centrelines.push(jacobian.map_err(|_| SolveError::NoDerivatives)?);
         }
         Ok(Sensitivity {
             links: rhs.rows(0, n).into_owned(),
             lambda: rhs.rows(n, m).into_owned(),
-            directions,
-            strains,
             centrelines,
         })
+    }
+
+    /// Strain measures of one rod at the equilibrium last asked for, with their derivatives by the rod's own 31
+    /// directions (12 link increments, 19 parameters); none before there was one.
+    pub fn strains(&self, model: &Model, rod: usize) -> Option<StrainJacobian> {
+        self.solver.systems.get(rod)?.strain_jacobian(&model.rods.get(rod)?.rod).ok()
     }
 }
 

@@ -1,13 +1,15 @@
 //! Continuation over the cycle: from the unstressed rest pose to the nearest state, then forward to
-//! the last and backward to the first, each step predicted along the tangent by drive values and loads. The loads grow
-//! from zero to those of that state before the drives move.
+//! the last and backward to the first, each step predicted along the tangents by drive values and loads (`predict.rs`).
+//! The loads grow from zero to those of that state before the drives move.
 
-use super::model::{Model, State};
+use super::model::Model;
 use super::newton::{Equilibrium, SolveError, Solver};
-use nalgebra::DVector;
+use super::predict::History;
 
 /// Smallest part of a step that is still tried when whole ones fail.
 const LEAST_PART: f64 = 1.0 / 128.0;
+/// States whose tangents predict a step, at most; after one that failed the last one's alone.
+const ORDER: usize = 4;
 
 /// Equilibria of all states 0..=N.
 #[derive(Clone, Debug)]
@@ -71,12 +73,13 @@ pub fn sweep(model: &Model) -> Result<Cycle, SweepError> {
 pub(super) struct Walker {
     equilibrium: Equilibrium,
     controls: Vec<f64>,
+    history: History,
 }
 
 impl Walker {
     /// At an equilibrium and the controls it belongs to.
     pub(super) fn new(equilibrium: Equilibrium, controls: Vec<f64>) -> Self {
-        Self { equilibrium, controls }
+        Self { equilibrium, controls, history: History::default() }
     }
 
     pub(super) fn equilibrium(&self) -> &Equilibrium {
@@ -92,7 +95,9 @@ impl Walker {
         let equilibrium = solver
             .solve(model, model.rest_state(), &controls)
             .map_err(|error| Self::lost(model, &controls, 0, error))?;
-        Ok(Self { equilibrium, controls })
+        let mut this = Self::new(equilibrium, controls);
+        this.remember(model, solver, &vec![0.0; this.controls.len()]);
+        Ok(this)
     }
 
     fn lost(model: &Model, controls: &[f64], state: usize, error: SolveError) -> SweepError {
@@ -109,7 +114,7 @@ impl Walker {
         target: &[f64],
     ) -> Result<(), SweepError> {
         let mut part = 1.0;
-        let mut fresh = true;
+        let mut order = ORDER;
         loop {
             let change: Vec<f64> = target.iter().zip(&self.controls).map(|(t, d)| t - d).collect();
             if change.iter().all(|c| c.abs() < 1e-15) {
@@ -120,11 +125,12 @@ impl Walker {
             } else {
                 self.controls.iter().zip(&change).map(|(d, c)| d + part * c).collect()
             };
-            match self.try_step(model, solver, &next, fresh) {
+            let change: Vec<f64> = next.iter().zip(&self.controls).map(|(n, d)| n - d).collect();
+            match self.try_step(model, solver, &next, &change, order) {
                 Ok(equilibrium) => {
                     self.equilibrium = equilibrium;
                     self.controls = next;
-                    fresh = false;
+                    self.remember(model, solver, &change);
                     if part >= 1.0 {
                         return Ok(());
                     }
@@ -133,7 +139,7 @@ impl Walker {
                 }
                 Err(error) => {
                     part *= 0.5;
-                    fresh = true;
+                    order = 1;
                     if part < LEAST_PART {
                         return Err(Self::lost(model, &self.controls, state, error));
                     }
@@ -142,31 +148,24 @@ impl Walker {
         }
     }
 
-    /// One predicted and corrected step. With `fresh` the solver's factors belong to another state
-    /// and are made anew.
+    fn remember(&mut self, model: &Model, solver: &mut Solver, change: &[f64]) {
+        self.history.add(model, solver, &self.equilibrium, change);
+    }
+
+    /// One predicted and corrected step.
     fn try_step(
-        &self,
+        &mut self,
         model: &Model,
         solver: &mut Solver,
         next: &[f64],
-        fresh: bool,
+        change: &[f64],
+        order: usize,
     ) -> Result<Equilibrium, SolveError> {
-        let mut state: State = self.equilibrium.state.clone();
-        if fresh {
-            state = solver.solve(model, state, &self.controls)?.state;
+        if self.history.is_empty() {
+            solver.solve(model, self.equilibrium.state.clone(), &self.controls)?;
+            self.remember(model, solver, &vec![0.0; self.controls.len()]);
         }
-        let mut tangent = DVector::zeros(model.layout.dofs() + model.rows());
-        let drives = model.layout.drives.len();
-        for (i, (to, from)) in
-            next.iter().zip(&self.controls).enumerate().filter(|(_, (to, from))| to != from)
-        {
-            let by_one = match i.checked_sub(drives) {
-                None => solver.drive_tangent(model, i),
-                Some(load) => solver.load_tangent(model, &state, load),
-            };
-            tangent += by_one * (to - from);
-        }
-        solver.advance(model, &mut state, &tangent, 1.0)?;
-        solver.solve(model, state, next)
+        let state = self.history.predict(model, solver, &self.equilibrium.state, change, order);
+        solver.correct(model, state.ok_or(SolveError::NotConverged)?, next)
     }
 }

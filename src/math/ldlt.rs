@@ -6,6 +6,9 @@ use nalgebra::DMatrix;
 /// (1 + √17) / 8: bounds the growth of both kinds of pivot alike.
 const ALPHA: f64 = 0.640_388_203_202_208;
 
+/// Right-hand sides that are solved for together.
+const BLOCK: usize = 8;
+
 /// Number of positive, negative and zero pivots: by Sylvester's law those of the eigenvalues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Inertia {
@@ -77,9 +80,84 @@ impl Ldlt {
 
     /// Solves A x = b for each column of `b` in place. Zero pivots give zero components.
     pub fn solve_in_place(&self, b: &mut DMatrix<f64>) {
-        for c in 0..b.ncols() {
-            let mut column = b.column_mut(c);
-            self.solve_column(column.as_mut_slice());
+        let mut rows = vec![[0.0; BLOCK]; b.nrows()];
+        for first in (0..b.ncols()).step_by(BLOCK) {
+            let width = BLOCK.min(b.ncols() - first);
+            for (i, row) in rows.iter_mut().enumerate() {
+                *row = std::array::from_fn(|c| if c < width { b[(i, first + c)] } else { 0.0 });
+            }
+            self.solve_rows(&mut rows);
+            for (i, row) in rows.iter().enumerate() {
+                for (c, value) in row.iter().enumerate().take(width) {
+                    b[(i, first + c)] = *value;
+                }
+            }
+        }
+    }
+
+    /// [`Self::solve_column`] for a block of right-hand sides, of which `b` has the rows.
+    fn solve_rows(&self, b: &mut [[f64; BLOCK]]) {
+        let a = &self.factors;
+        let n = a.nrows();
+        let mut k = 0;
+        while k < n {
+            let (pivot, two) = self.pivots[k];
+            if two {
+                b.swap(k + 1, pivot);
+                let (x, y) = (b[k], b[k + 1]);
+                for (i, row) in b.iter_mut().enumerate().skip(k + 2) {
+                    let (p, q) = (a[(i, k)], a[(i, k + 1)]);
+                    for c in 0..BLOCK {
+                        row[c] -= p * x[c] + q * y[c];
+                    }
+                }
+                let (d, e, f) = (a[(k, k)], a[(k + 1, k)], a[(k + 1, k + 1)]);
+                let determinant = (d / e) * (f / e) - 1.0;
+                for c in 0..BLOCK {
+                    b[k][c] = ((f / e) * (x[c] / e) - y[c] / e) / determinant;
+                    b[k + 1][c] = ((d / e) * (y[c] / e) - x[c] / e) / determinant;
+                }
+                k += 2;
+            } else {
+                b.swap(k, pivot);
+                let x = b[k];
+                for (i, row) in b.iter_mut().enumerate().skip(k + 1) {
+                    let p = a[(i, k)];
+                    for c in 0..BLOCK {
+                        row[c] -= p * x[c];
+                    }
+                }
+                let d = a[(k, k)];
+                b[k] = if d == 0.0 { [0.0; BLOCK] } else { x.map(|x| x / d) };
+                k += 1;
+            }
+        }
+        let mut k = n;
+        while k > 0 {
+            k -= 1;
+            let second = k > 0 && self.pivots[k - 1].1;
+            let mut own = b[k];
+            let mut before = if second { b[k - 1] } else { [0.0; BLOCK] };
+            for (i, row) in b.iter().enumerate().skip(k + 1) {
+                let p = a[(i, k)];
+                for c in 0..BLOCK {
+                    own[c] -= p * row[c];
+                }
+                if second {
+                    let q = a[(i, k - 1)];
+                    for c in 0..BLOCK {
+                        before[c] -= q * row[c];
+                    }
+                }
+            }
+            b[k] = own;
+            if second {
+                b[k - 1] = before;
+            }
+            b.swap(k, self.pivots[k].0);
+            if second {
+                k -= 1;
+            }
         }
     }
 
@@ -172,16 +250,18 @@ fn eliminate_one(a: &mut DMatrix<f64>, k: usize, inertia: &mut Inertia) {
     } else {
         inertia.negative += 1;
     }
-    for j in k + 1..n {
-        let w = a[(j, k)] / d;
+    let (left, right) = a.as_mut_slice().split_at_mut((k + 1) * n);
+    let pivot = &mut left[k * n..];
+    for (j, column) in (k + 1..n).zip(right.chunks_exact_mut(n)) {
+        let w = pivot[j] / d;
         if w != 0.0 {
-            for i in j..n {
-                a[(i, j)] -= a[(i, k)] * w;
+            for (to, from) in column[j..].iter_mut().zip(&pivot[j..]) {
+                *to -= from * w;
             }
         }
     }
-    for i in k + 1..n {
-        a[(i, k)] /= d;
+    for v in &mut pivot[k + 1..] {
+        *v /= d;
     }
 }
 
@@ -198,16 +278,17 @@ fn eliminate_two(a: &mut DMatrix<f64>, k: usize, inertia: &mut Inertia) {
     } else {
         inertia.negative += 2;
     }
-    for j in k + 2..n {
-        let (x, y) = (a[(j, k)], a[(j, k + 1)]);
+    let (left, right) = a.as_mut_slice().split_at_mut((k + 2) * n);
+    let (first, second) = left[k * n..].split_at_mut(n);
+    for (j, column) in (k + 2..n).zip(right.chunks_exact_mut(n)) {
+        let (x, y) = (first[j], second[j]);
         let w = ((f / e) * (x / e) - y / e) / determinant;
         let v = ((d / e) * (y / e) - x / e) / determinant;
-        for i in j..n {
-            a[(i, j)] -= a[(i, k)] * w + a[(i, k + 1)] * v;
+        for ((to, p), q) in column[j..].iter_mut().zip(&first[j..]).zip(&second[j..]) {
+            *to -= p * w + q * v;
         }
-        // Column k of row j is not read again by later j.
-        a[(j, k)] = w;
-        a[(j, k + 1)] = v;
+        // Row j of these columns is not read again by later j.
+        (first[j], second[j]) = (w, v);
     }
 }
 
@@ -248,6 +329,11 @@ mod tests {
                 f.solve_column(b.as_mut_slice());
                 let eigen = SymmetricEigen::new(a.clone()).eigenvalues;
                 let condition = eigen.amax() / eigen.iter().map(|v| v.abs()).fold(f64::MAX, f64::min);
+                let mut many = DMatrix::from_fn(n, BLOCK + 3, |i, c| (i as f64 + c as f64).sin());
+                let mut one = many.clone();
+                f.solve_in_place(&mut many);
+                one.column_iter_mut().for_each(|mut c| f.solve_column(c.as_mut_slice()));
+                assert_eq!(many, one);
                 assert!((b - x).amax() < 1e-13 * condition * n as f64, "n {n} seed {seed}");
                 let negative = eigen.iter().filter(|v| **v < 0.0).count();
                 assert_eq!(f.inertia().negative, negative);

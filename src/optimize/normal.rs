@@ -66,15 +66,6 @@ impl Normal {
         }
     }
 
-    /// Adds a sum over m other variables that depend on the n through `chain` (m × n).
-    pub fn add_chained(&mut self, other: &Self, chain: &DMatrix<f64>) {
-        self.cost += other.cost;
-        self.gradient.gemv_tr(1.0, chain, &other.gradient, 1.0);
-        self.tilt.gemv_tr(1.0, chain, &other.tilt, 1.0);
-        let product = chain.tr_mul(&(&other.gauss_newton * chain));
-        self.gauss_newton += product.lower_triangle();
-    }
-
     /// Adds another sum.
     pub fn merge(&mut self, other: &Self) {
         self.cost += other.cost;

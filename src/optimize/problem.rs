@@ -277,7 +277,6 @@ impl<'d> Problem<'d> {
                 |workspace, s| {
                     let target = target(&trial.model, s);
                     let view = self.view(&trial.model, &trial.cycle, &trial.loaded, &trial.capsules, s);
-                    let free = workspace.at(&trial.model, view.equilibrium, &target).ok()?;
                     let loaded = trial
                         .cases
                         .iter()
@@ -289,7 +288,8 @@ impl<'d> Problem<'d> {
                             workspace.at_moving(&trial.model, e, &target, case.get(s..=s)?, &moved).ok()
                         })
                         .collect::<Option<Vec<_>>>()?;
-                    Some(self.state_parts(trial, &view, &StatesSensitivity { free, loaded }))
+                    let free = workspace.at(&trial.model, view.equilibrium, &target).ok()?;
+                    Some(self.state_parts(trial, &view, &StatesSensitivity { free, loaded, workspace }))
                 },
             )
             .collect();

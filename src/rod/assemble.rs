@@ -4,6 +4,7 @@
 //! θ₁, x₂, θ₂, …, x_{N−2}, θ_{N−2} (internal), x_{N−1}, θ_{N−1}, e_{N−1} (what link B carries). Slot k of
 //! three numbers begins at 4k, θ_j is number 4j + 3; the half bandwidth is 10 throughout.
 
+use super::expected::RodForces;
 use super::shear::ShearSystem;
 use super::stencil::{Block, EdgeFrame, Local, VertexMeasures};
 use super::{Rod, RodState};
@@ -24,12 +25,23 @@ pub struct RodSystem {
     pub(crate) n: usize,
     pub(crate) energy: f64,
     pub(crate) frames: Vec<EdgeFrame>,
+    /// See [`Self::edge_basis`].
+    pub(crate) bases: Vec<Matrix3<f64>>,
     pub(crate) measures: Vec<VertexMeasures>,
     pub(crate) edge_gradient: Vec<Local>,
     pub(crate) edge_hessian: Vec<Block>,
     pub(crate) mixed: Vec<Block>,
-    /// Axial force EA ε per edge, N.
-    pub(crate) axial_force: Vec<f64>,
+    /// Of the last assembled state.
+    pub(crate) forces: RodForces,
+    /// What the next assembly, if `expecting`, or the last, unless `exact`, forms its geometric stiffness with.
+    pub(crate) expected: RodForces,
+    pub(crate) expecting: bool,
+    pub(crate) exact: bool,
+    /// Stiffness of each vertex by its measures, N·mm.
+    pub(crate) tangents: Vec<[f64; 3]>,
+    /// Scratch: a change of forces, and all coordinates of the rod in their banded order.
+    pub(crate) changing: RodForces,
+    pub(crate) coordinates: Vec<f64>,
     pub(crate) gradient: Vec<f64>,
     pub(crate) band: Vec<BandColumn>,
     /// Moment arms of x₁ and x_{N−1} from their link's centre.
@@ -46,6 +58,8 @@ pub struct RodSystem {
     pub(crate) condensed_hessian: SMatrix<f64, 12, 12>,
     pub(crate) solution: Vec<[f64; 1]>,
     pub(crate) increment: Vec<f64>,
+    /// Of the last back-substitution.
+    pub(crate) last_link: SVector<f64, 12>,
     pub(crate) columns: Option<Box<super::sensitivity::ParameterColumns>>,
     pub(crate) twist_scale: f64,
     /// Only for rods with shear.
@@ -91,11 +105,18 @@ impl RodSystem {
             n,
             energy: 0.0,
             frames: vec![EdgeFrame::ZERO; n],
+            bases: vec![Matrix3::zeros(); n],
             measures: vec![VertexMeasures::ZERO; n],
             edge_gradient: vec![[0.0; 4]; n],
             edge_hessian: vec![[[0.0; 4]; 4]; n],
             mixed: vec![[[0.0; 4]; 4]; n],
-            axial_force: vec![0.0; n],
+            forces: RodForces::zeros(n),
+            expected: RodForces::zeros(n),
+            expecting: false,
+            exact: true,
+            tangents: vec![[0.0; 3]; n],
+            changing: RodForces::zeros(n),
+            coordinates: vec![0.0; 4 * n + 3],
             gradient: vec![0.0; 4 * n + 3],
             band: vec![[0.0; COLUMN]; 4 * n + 3],
             arms: [Vector3::zeros(); 2],
@@ -109,6 +130,7 @@ impl RodSystem {
             condensed_hessian: SMatrix::zeros(),
             solution: vec![[0.0; 1]; internal + HALF_BANDWIDTH],
             increment: vec![0.0; internal],
+            last_link: SVector::zeros(),
             columns: None,
             twist_scale: 1.0,
             shear: (!rod.shear.is_empty()).then(|| Box::new(ShearSystem::new(n))),
@@ -172,6 +194,7 @@ impl RodSystem {
         let n = self.n;
         self.columns = None;
         self.factored = None;
+        self.exact = !std::mem::take(&mut self.expecting);
         self.twist_scale = rod.edge_length_mm();
         self.local_terms(rod, state);
         self.shear_terms(rod, state);
@@ -201,17 +224,20 @@ impl RodSystem {
         for ((frame, x), m1) in zipped {
             *frame = EdgeFrame::new(&x[0], &x[1], m1);
         }
+        for (basis, f) in self.bases.iter_mut().zip(&self.frames) {
+            *basis = Matrix3::from_columns(&[f.m1, f.m2, f.t]) * (1.0 / f.l);
+        }
         for (j, frame) in self.frames.iter().enumerate() {
             let mut g = [0.0; 4];
             let mut h = [[0.0; 4]; 4];
-            self.axial_force[j] = 0.0;
+            self.forces.axial[j] = 0.0;
             if j > 0 && j < n - 1 {
                 let stretch = frame.l - rod.edge_lengths[j];
                 let force = rod.ea[j] * stretch / rod.stretch_lengths[j];
-                self.axial_force[j] = force;
+                self.forces.axial[j] = force;
                 self.energy += 0.5 * force * stretch;
                 g[2] = force * frame.l;
-                h[0][0] = force * frame.l;
+                h[0][0] = if self.exact { force } else { self.expected.axial[j] } * frame.l;
                 h[1][1] = h[0][0];
                 h[2][2] = rod.ea[j] / rod.stretch_lengths[j] * frame.l * frame.l;
             }
@@ -221,8 +247,11 @@ impl RodSystem {
         for i in 1..n {
             let measures = VertexMeasures::new(&self.frames[i - 1], &self.frames[i]);
             let more = self.wagner_twisting(rod, i, &measures);
-            let term = measures.energy(&rod.vertex_stiffness[i], &rod.rest_measures[i], &more);
+            let expected = (!self.exact).then(|| &self.expected.moments[i]);
+            let term = measures.energy(&rod.vertex_stiffness[i], &rod.rest_measures[i], &more, expected);
             self.measures[i] = measures;
+            self.forces.moments[i] = term.moments;
+            self.tangents[i] = term.tangents;
             self.energy += term.energy;
             add_local(&mut self.edge_gradient[i - 1], &term.g_before);
             add_local(&mut self.edge_gradient[i], &term.g_after);
@@ -235,8 +264,7 @@ impl RodSystem {
 
     /// Columns of the map from a local to a spatial covector of edge `j`: (m₁, m₂, t)/|e|.
     pub(crate) fn edge_basis(&self, j: usize) -> Matrix3<f64> {
-        let f = &self.frames[j];
-        Matrix3::from_columns(&[f.m1, f.m2, f.t]) / f.l
+        self.bases[j]
     }
 
     /// Adds gradient and diagonal block of edge `j` to the banded system.
@@ -252,32 +280,26 @@ impl RodSystem {
         );
         let block = basis * sym * basis.transpose();
         let turn = basis * Vector3::new(h[3][0], h[3][1], h[3][2]);
-        let signs = slot_signs(j, self.n);
-        let theta = 4 * j + 3;
-        self.gradient[theta] += g[3];
-        self.band[theta][0] += h[3][3];
-        for (s, sign) in signs.into_iter().enumerate() {
-            if sign == 0.0 {
-                continue;
-            }
-            let slot = 4 * (j + s);
-            for c in 0..3 {
-                self.gradient[slot + c] += sign * force[c];
-                for r in c..3 {
-                    self.band[slot + c][r - c] += block[(r, c)];
-                }
-                // θ_j comes after slot j and before slot j + 1.
-                let (row, column) = if s == 0 { (theta, slot + c) } else { (slot + c, theta) };
-                self.band[column][row - column] += sign * turn[c];
-            }
+        let [s0, s1] = slot_signs(j, self.n);
+        // Slot j, θ_j, slot j + 1.
+        let Some(to) = self.gradient[4 * j..].first_chunk_mut::<7>() else { return };
+        to[3] += g[3];
+        for c in 0..3 {
+            to[c] += s0 * force[c];
+            to[4 + c] += s1 * force[c];
         }
-        let both = signs[0] * signs[1];
-        if both != 0.0 {
-            for c in 0..3 {
-                for r in 0..3 {
-                    self.band[4 * j + c][4 + r - c] += both * block[(r, c)];
-                }
+        let Some(to) = self.band[4 * j..].first_chunk_mut::<7>() else { return };
+        to[3][0] += h[3][3];
+        for c in 0..3 {
+            for r in c..3 {
+                to[c][r - c] += s0 * s0 * block[(r, c)];
+                to[4 + c][r - c] += s1 * s1 * block[(r, c)];
             }
+            for r in 0..3 {
+                to[c][4 + r - c] += s0 * s1 * block[(r, c)];
+            }
+            to[c][3 - c] += s0 * turn[c];
+            to[3][1 + c] += s1 * turn[c];
         }
     }
 
@@ -290,39 +312,22 @@ impl RodSystem {
         let block = basis1 * inner.transpose() * basis0.transpose();
         let turn0 = basis1 * Vector3::new(m[3][0], m[3][1], m[3][2]);
         let turn1 = basis0 * Vector3::new(m[0][3], m[1][3], m[2][3]);
-        let (s0, s1) = (slot_signs(i - 1, self.n), slot_signs(i, self.n));
-        let (theta0, theta1) = (4 * i - 1, 4 * i + 3);
-        self.band[theta0][4] += m[3][3];
-        for (a, sign) in s1.into_iter().enumerate() {
-            // θ_{i−1} with the slots of edge i.
-            let slot = 4 * (i + a);
-            for c in 0..3 {
-                self.band[theta0][slot + c - theta0] += sign * turn0[c];
+        let ([a, b], [c, d]) = (slot_signs(i - 1, self.n), slot_signs(i, self.n));
+        // Slot i − 1, θ_{i−1}, slot i, θ_i, slot i + 1.
+        let Some(to) = self.band[4 * i - 4..].first_chunk_mut::<11>() else { return };
+        to[3][4] += m[3][3];
+        for k in 0..3 {
+            to[3][1 + k] += c * turn0[k];
+            to[3][5 + k] += d * turn0[k];
+            to[k][7 - k] += a * turn1[k];
+            to[4 + k][3 - k] += b * turn1[k];
+            for r in 0..3 {
+                to[k][4 + r - k] += a * c * block[(r, k)];
+                to[k][8 + r - k] += a * d * block[(r, k)];
+                to[4 + k][4 + r - k] += b * d * block[(r, k)];
             }
-        }
-        for (a, sign) in s0.into_iter().enumerate() {
-            // θ_i with the slots of edge i − 1.
-            let slot = 4 * (i - 1 + a);
-            for c in 0..3 {
-                self.band[slot + c][theta1 - slot - c] += sign * turn1[c];
-            }
-        }
-        for (a, sign1) in s1.into_iter().enumerate() {
-            for (b, sign0) in s0.into_iter().enumerate() {
-                let sign = sign0 * sign1;
-                if sign == 0.0 {
-                    continue;
-                }
-                let (row, column) = (4 * (i + a), 4 * (i - 1 + b));
-                for c in 0..3 {
-                    for r in 0..3 {
-                        if row > column {
-                            self.band[column + c][row + r - column - c] += sign * block[(r, c)];
-                        } else if r >= c {
-                            self.band[column + c][r - c] += sign * (block[(r, c)] + block[(c, r)]);
-                        }
-                    }
-                }
+            for r in k..3 {
+                to[4 + k][r - k] += b * c * (block[(r, k)] + block[(k, r)]);
             }
         }
     }
@@ -345,7 +350,16 @@ impl RodSystem {
             self.band[column][row - column]
         });
         let mut hessian = jacobian.transpose() * h * jacobian;
-        for (g, v) in [(g.fixed_rows::<3>(0), &r), (g.fixed_rows::<3>(4), &e)] {
+        let mut forces: [Vector3<f64>; 2] = [g.fixed_rows::<3>(0).into(), g.fixed_rows::<3>(4).into()];
+        if !self.exact {
+            // The free edge pulls at its vertex, the clamped one at itself.
+            let [free, clamped] = if end == 0 { [1, 0] } else { [n - 2, n - 1] };
+            for (force, j, sign) in [(0, free, if end == 0 { -1.0 } else { 1.0 }), (1, clamped, 1.0)] {
+                let [a, b, s, _] = self.expected_excess(j);
+                forces[force] += self.edge_basis(j) * Vector3::new(a, b, s) * sign;
+            }
+        }
+        for (g, v) in [(forces[0], &r), (forces[1], &e)] {
             let outer = g * v.transpose();
             let second = (outer + outer.transpose()) * 0.5 - Matrix3::identity() * g.dot(v);
             let mut block = hessian.fixed_view_mut::<3, 3>(3, 3);

@@ -184,12 +184,23 @@ impl RodSystem {
     /// slip and force; for
     /// [`Rod::retract`](super::Rod::retract). Call after [`Self::condense`].
     pub fn back_substitute(&mut self, d_link: &SVector<f64, 12>) -> &[f64] {
+        self.substitute(d_link, 1.0)
+    }
+
+    /// The same without what balances the rod: −K⁻¹C d, its rate when the links move at the rate `d`.
+    pub fn back_substitute_rate(&mut self, d_link: &SVector<f64, 12>) -> &[f64] {
+        self.substitute(d_link, 0.0)
+    }
+
+    /// −K⁻¹(`share` g_int + C d).
+    fn substitute(&mut self, d_link: &SVector<f64, 12>, share: f64) -> &[f64] {
         let n = self.factors.order();
         let mut chain = *d_link;
-        let extra = self.shear_increment(&mut chain);
+        let extra = self.shear_increment(&mut chain, share);
+        self.last_link = *d_link;
         let d_link = &chain;
         for (x, y) in self.solution.iter_mut().zip(&self.reduced) {
-            let mut sum = y[6];
+            let mut sum = share * y[6];
             for c in 0..6 {
                 sum += y[c] * d_link[c];
             }

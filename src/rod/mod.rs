@@ -51,14 +51,15 @@
 //! three-dimensional finite elements. With shear, six internal freedoms more (`shear.rs`), nothing else changes
 //! for the caller.
 
+mod adjoint;
 mod assemble;
 mod centreline;
 mod condense;
 #[cfg(test)]
 mod derivative_tests;
+mod expected;
 mod options;
 mod rest;
-mod rest_lengths;
 mod section;
 mod sensitivity;
 #[cfg(test)]
@@ -76,6 +77,7 @@ pub use crate::ir::RodModel;
 pub use assemble::RodSystem;
 pub use centreline::CentrelineJacobian;
 pub use condense::FactorReport;
+pub use expected::RodForces;
 pub use options::{Corrections, RestFrames, RodOptions};
 pub use rest::{MIN_EDGES, PARAMETERS, RodError, RodParameters};
 pub use section::{RodMaterial, SectionShape, Stiffness, ellipse_stiffness, rectangle_stiffness};

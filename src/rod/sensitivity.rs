@@ -45,6 +45,8 @@ pub enum SensitivityError {
     NoColumns,
     /// A matrix has the wrong number of rows or columns.
     Shape,
+    /// Only rods without shear and Wagner's strain have them.
+    Corrected,
 }
 
 impl std::fmt::Display for SensitivityError {
@@ -52,6 +54,7 @@ impl std::fmt::Display for SensitivityError {
         f.write_str(match self {
             Self::NoDerivatives => "the rod was built without derivatives",
             Self::NoColumns => "parameter columns were not computed for this state",
+            Self::Corrected => "only rods without shear and Wagner's strain have this derivative",
             Self::Shape => "a sensitivity matrix has the wrong shape",
         })
     }
@@ -174,16 +177,12 @@ impl RodSystem {
         }
         let mut out = DMatrix::zeros(columns.solved.len(), n);
         for (p, mut to) in out.column_iter_mut().enumerate() {
+            // Most parameters of a rod do not depend on a given design parameter.
             let (z, q) = (d_link.column(p), dq.column(p));
+            let all = z.iter().chain(q.iter()).copied().enumerate();
+            let by: Vec<(usize, f64)> = all.filter(|(_, v)| *v != 0.0).collect();
             for (value, row) in to.iter_mut().zip(&columns.solved) {
-                let mut sum = 0.0;
-                for c in 0..12 {
-                    sum += row[c] * z[c];
-                }
-                for c in 0..PARAMETERS {
-                    sum += row[FIRST_PARAMETER + c] * q[c];
-                }
-                *value = -sum;
+                *value = -by.iter().map(|(c, v)| row[*c] * v).sum::<f64>();
             }
         }
         Ok(out)

@@ -23,6 +23,9 @@ pub(crate) const FREEDOMS: usize = 6;
 /// First shift of the slip's block relative to its diagonal, its growth, and the most tries.
 const SHIFTS: (f64, f64, usize) = (1e-3, 8.0, 24);
 
+/// Pivots of slip and force below this part of the largest entry are not trusted with their sign.
+const NEAR_ZERO: f64 = 1e-10;
+
 type Vector6 = SVector<f64, FREEDOMS>;
 type Matrix6 = SMatrix<f64, FREEDOMS, FREEDOMS>;
 /// Derivatives of slip and force by the 12 link freedoms and the parameters.
@@ -47,6 +50,27 @@ pub(crate) struct ShearSystem {
     gradient: Vector6,
     coupling: SMatrix<f64, FREEDOMS, 12>,
     inverse: Matrix6,
+}
+
+/// Number of negative eigenvalues, by the signs of the pivots (Sylvester) where none is near zero.
+fn negative(m: &Matrix6) -> usize {
+    let mut a = *m;
+    let least = NEAR_ZERO * m.amax();
+    let mut count = 0;
+    for k in 0..FREEDOMS {
+        let pivot = a[(k, k)];
+        if pivot.is_nan() || pivot.abs() <= least {
+            return m.symmetric_eigenvalues().iter().filter(|e| **e < 0.0).count();
+        }
+        count += usize::from(pivot < 0.0);
+        for j in k + 1..FREEDOMS {
+            let l = a[(j, k)] / pivot;
+            for i in j..FREEDOMS {
+                a[(i, j)] -= a[(i, k)] * l;
+            }
+        }
+    }
+    count
 }
 
 impl ShearSystem {
@@ -173,8 +197,7 @@ impl RodSystem {
         let mut hessian = shear.force_hessian;
         let mut gradient = shear.force_gradient;
         let inverse = self.factors.inverse_pivots();
-        for (i, ((y, z), d)) in shear.reduced.iter().zip(&self.reduced).zip(inverse).enumerate() {
-            let b = i.checked_sub(n - END_COUPLING).and_then(|k| self.reduced_b.get(k));
+        for ((y, z), d) in shear.reduced.iter().zip(&self.reduced).zip(inverse) {
             for k in 0..3 {
                 let s = y[k] * d;
                 gradient[k] -= s * z[6];
@@ -184,8 +207,14 @@ impl RodSystem {
                 for r in 0..6 {
                     by_force[(r, k)] -= s * z[r];
                 }
-                for r in 0..b.map_or(0, |b| b.len()) {
-                    by_force[(6 + r, k)] -= s * b.map_or(0.0, |b| b[r]);
+            }
+        }
+        let last = n - END_COUPLING..n;
+        for ((y, z), d) in shear.reduced[last.clone()].iter().zip(&self.reduced_b).zip(&inverse[last]) {
+            for k in 0..3 {
+                let s = y[k] * d;
+                for r in 0..6 {
+                    by_force[(6 + r, k)] -= s * z[r];
                 }
             }
         }
@@ -206,7 +235,6 @@ impl RodSystem {
         // To one unit: F in units of the rod's shear stiffness times a length.
         let scale = Vector6::from_fn(|i, _| if i < 3 { 1.0 } else { 1.0 / shear.compliance });
         let scaled = Matrix6::from_fn(|i, j| block[(i, j)] * scale[i] * scale[j]);
-        let negative = |m: &Matrix6| m.symmetric_eigenvalues().iter().filter(|e| **e < 0.0).count();
         let count = negative(&scaled);
         report.negative_pivots = (report.negative_pivots + count).saturating_sub(3);
         let mut used = scaled;
@@ -242,10 +270,10 @@ impl RodSystem {
         report
     }
 
-    /// Increments of slip and force for the links' `d`, which becomes the chain's.
-    pub(crate) fn shear_increment(&self, d: &mut SVector<f64, 12>) -> Option<Vector6> {
+    /// Increments of slip and force for the links' `d`, which becomes the chain's, and for `share` of the gradient.
+    pub(crate) fn shear_increment(&self, d: &mut SVector<f64, 12>, share: f64) -> Option<Vector6> {
         let shear = self.shear.as_deref()?;
-        let extra = -(shear.inverse * (shear.gradient + shear.coupling * *d));
+        let extra = -(shear.inverse * (shear.gradient * share + shear.coupling * *d));
         let mut b = d.fixed_rows_mut::<3>(6);
         b -= extra.fixed_rows::<3>(0);
         Some(extra)

@@ -1,7 +1,7 @@
 //! Newton's method for one rod with link A fixed and link B free, loaded or prescribed: the smallest whole
 //! problem, for references and quick checks of one flexure. Mechanisms are solved by `equilibrium`.
 
-use super::{FactorReport, RetractError, Rod, RodState, RodSystem};
+use super::{FactorReport, RetractError, Rod, RodForces, RodState, RodSystem};
 use crate::math::Pose;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use std::fmt;
@@ -14,6 +14,14 @@ const RELATIVE_RESIDUAL: f64 = 1e-9;
 const LEAST_FORCE: f64 = 1e-3;
 /// Longest turn of link B in one iteration, rad.
 const MAX_TURN: f64 = 0.5;
+
+/// Weights of Adams and Bashforth for equal steps, by the number of tangents known.
+const ADAMS: [[f64; 4]; 4] = [
+    [1.0, 0.0, 0.0, 0.0],
+    [1.5, -0.5, 0.0, 0.0],
+    [23.0 / 12.0, -16.0 / 12.0, 5.0 / 12.0, 0.0],
+    [55.0 / 24.0, -59.0 / 24.0, 37.0 / 24.0, -9.0 / 24.0],
+];
 
 /// Dead loads on link B.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,6 +97,18 @@ pub struct SingleRod {
     pub system: RodSystem,
     /// Factor report at the last equilibrium.
     pub report: Option<FactorReport>,
+    /// Whether `system` is that of an equilibrium at `state`.
+    solved: bool,
+    /// The last movements of link B, the latest first.
+    moves: Vec<Move>,
+}
+
+/// Rates of a rod at the beginning of a movement of link B.
+#[derive(Clone, Debug)]
+struct Move {
+    by: SVector<f64, 12>,
+    inside: Vec<f64>,
+    forces: RodForces,
 }
 
 impl SingleRod {
@@ -96,7 +116,8 @@ impl SingleRod {
     pub fn new(rod: Rod, center_a: Vector3<f64>, center_b: Vector3<f64>) -> Self {
         let system = RodSystem::new(&rod);
         let (pose_a, pose_b) = (Pose::rest(center_a), Pose::rest(center_b));
-        Self { state: rod.rest_state(), rod, pose_a, pose_b, system, report: None }
+        let (solved, moves) = (false, Vec::new());
+        Self { state: rod.rest_state(), rod, pose_a, pose_b, system, report: None, solved, moves }
     }
 
     fn assemble(&mut self) {
@@ -115,6 +136,7 @@ impl SingleRod {
             let b = self.pose_b.retract(&(d.fixed_rows::<3>(6) * step), &(d.fixed_rows::<3>(9) * step));
             outcome = self.rod.retract(&mut self.state, &scaled, &self.pose_a, &b);
             if outcome.is_ok() {
+                self.system.expect(&self.rod, scale);
                 self.pose_b = b;
                 return Ok(());
             }
@@ -123,19 +145,48 @@ impl SingleRod {
         outcome.map_err(SingleError::Step)
     }
 
-    /// Moves link B by an increment, with the rod following to first order, and solves again.
+    /// Moves link B by an increment, with the rod following as predicted by its tangents here and, of a movement that
+    /// goes on, at the states before (Adams and Bashforth), and solves again.
     ///
     /// # Errors
     /// When no equilibrium is reached.
     pub fn move_b(&mut self, du: &Vector3<f64>, dphi: &Vector3<f64>) -> Result<usize, SingleError> {
-        self.assemble();
-        self.system.factor();
-        self.system.condense();
+        if !self.solved {
+            self.assemble();
+            self.report = Some(self.system.factor_unshifted());
+            self.system.condense();
+        }
         let mut d = SVector::<f64, 12>::zeros();
         d.fixed_rows_mut::<3>(6).copy_from(du);
         d.fixed_rows_mut::<3>(9).copy_from(dphi);
-        self.advance(&d, true)?;
-        self.solve(&EndLoad::NONE, [false; 6])
+        if self.moves.first().is_some_and(|last| last.by != d) {
+            self.moves.clear();
+        }
+        let inside = self.system.back_substitute_rate(&d).to_vec();
+        let mut forces = self.system.forces().clone();
+        self.system.force_change(&self.rod, &inside, &d, &mut forces);
+        self.moves.insert(0, Move { by: d, inside, forces });
+        self.moves.truncate(ADAMS.len());
+        let mut inside = vec![0.0; self.rod.internal_freedoms()];
+        let mut forces = self.system.forces().clone();
+        for (of, weight) in self.moves.iter().zip(ADAMS[self.moves.len() - 1]) {
+            forces.add_scaled(weight, &of.forces);
+            inside.iter_mut().zip(&of.inside).for_each(|(to, from)| *to += weight * from);
+        }
+        let b = self.pose_b.retract(du, dphi);
+        self.solved = false;
+        if self.rod.retract(&mut self.state, &inside, &self.pose_a, &b).is_ok() {
+            self.pose_b = b;
+            self.system.expect_forces(&forces);
+        } else {
+            self.moves.clear();
+            self.advance(&d, true)?;
+        }
+        let solved = self.solve(&EndLoad::NONE, [false; 6]);
+        if solved.is_err() {
+            self.moves.clear();
+        }
+        solved
     }
 
     /// Newton's method for the internal freedoms and the `free` ones of link B (du, dφ). Returns the
@@ -145,23 +196,12 @@ impl SingleRod {
     /// When no equilibrium is reached; the state is then the last iterate.
     pub fn solve(&mut self, load: &EndLoad, free: [bool; 6]) -> Result<usize, SingleError> {
         let mut residual = f64::INFINITY;
+        self.solved = false;
         let length = self.rod.length_mm();
         let least = LEAST_FORCE * self.rod.least_bending_stiffness() / (length * length);
         for iteration in 0..MAX_ITERATIONS {
             self.assemble();
-            self.system.factor();
-            let (g, h) = self.system.condense();
             let (lg, lh) = load.derivatives(&self.pose_b);
-            let mut g6: SVector<f64, 6> = g.fixed_rows::<6>(6) + lg;
-            let mut h6: SMatrix<f64, 6, 6> = h.fixed_view::<6, 6>(6, 6) + lh;
-            for (i, free) in free.into_iter().enumerate() {
-                if !free {
-                    g6[i] = 0.0;
-                    h6.row_mut(i).fill(0.0);
-                    h6.column_mut(i).fill(0.0);
-                    h6[(i, i)] = 1.0;
-                }
-            }
             // What the condensed gradient misses while the rod is out of balance is the residual itself.
             let link = (0..6)
                 .filter(|&i| free[i])
@@ -174,9 +214,25 @@ impl SingleRod {
             let scale = self.system.largest_internal_force().max(least);
             let tolerance = RELATIVE_RESIDUAL * scale + self.system.rounding_floor(&self.rod, &self.state);
             if residual <= tolerance {
+                if !self.system.is_exact(tolerance) {
+                    self.assemble();
+                }
                 self.report = Some(self.system.factor_unshifted());
                 self.system.condense();
+                self.solved = true;
                 return Ok(iteration);
+            }
+            self.system.factor();
+            let (g, h) = self.system.condense();
+            let mut g6: SVector<f64, 6> = g.fixed_rows::<6>(6) + lg;
+            let mut h6: SMatrix<f64, 6, 6> = h.fixed_view::<6, 6>(6, 6) + lh;
+            for (i, free) in free.into_iter().enumerate() {
+                if !free {
+                    g6[i] = 0.0;
+                    h6.row_mut(i).fill(0.0);
+                    h6.column_mut(i).fill(0.0);
+                    h6[(i, i)] = 1.0;
+                }
             }
             let step = h6.lu().solve(&-g6).ok_or(SingleError::Singular)?;
             let mut d = SVector::<f64, 12>::zeros();

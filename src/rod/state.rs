@@ -145,6 +145,7 @@ impl Rod {
         }
         let poses = [pose_a, &chain_b];
         let mut previous: Option<EdgeFrame> = None;
+        let mut m1 = Vec::with_capacity(self.edges);
         for j in 0..self.edges {
             let frame = self.moved(state, increment, poses, j).ok_or(RetractError::EdgeTurn { edge: j })?;
             if let Some(p) = &previous {
@@ -157,17 +158,12 @@ impl Rod {
                     return Err(RetractError::VertexTwist { vertex: j });
                 }
             }
+            m1.push(frame.m1);
             previous = Some(frame);
         }
-        for j in 1..self.edges - 1 {
-            if let Some(frame) = self.moved(state, increment, poses, j) {
-                state.m1[j] = frame.m1;
-            }
-            // Edge j + 1 still needs the old x_{j+1}, which edge j no longer needs: x_j may move now.
-            if j >= 2 {
-                let d = Vector3::from_column_slice(&increment[4 * j - 7..4 * j - 4]);
-                state.vertices[j] += d;
-            }
+        state.m1 = m1;
+        for (x, d) in state.vertices[2..self.edges - 1].iter_mut().zip(increment[1..].chunks_exact(4)) {
+            *x += Vector3::new(d[0], d[1], d[2]);
         }
         (state.slip, state.force) = (slip, force);
         self.write_clamps(state, pose_a, pose_b);

@@ -34,7 +34,7 @@ impl EdgeFrame {
     pub(crate) fn new(x0: &Vector3<f64>, x1: &Vector3<f64>, m1: &Vector3<f64>) -> Self {
         let e = x1 - x0;
         let l = e.norm();
-        let t = e / l;
+        let t = e * (1.0 / l);
         Self { t, m1: *m1, m2: t.cross(m1), l }
     }
 }
@@ -67,6 +67,10 @@ pub(crate) struct VertexEnergy {
     pub after: Block,
     /// Rows: edge before; columns: edge after.
     pub mixed: Block,
+    /// Conjugate to the measures, N·mm.
+    pub moments: [f64; 3],
+    /// Their derivatives by the measures.
+    pub tangents: [f64; 3],
 }
 
 /// Energy of a vertex beyond ½ΣB(f − f̄)², a function of its twist, with its first and second derivative by it.
@@ -75,6 +79,25 @@ pub(crate) struct Twisting {
     pub energy: f64,
     pub moment: f64,
     pub tangent: f64,
+}
+
+/// Local coordinates by which the measures have derivatives: all but the stretch σ.
+const TURNING: [usize; 3] = [0, 1, 3];
+
+/// Lower triangle of Σ s gᵀ + r (w − gr xᵀ − x grᵀ), where s, g, gr and x have no part along σ.
+#[inline(always)]
+fn lower(w: &Block, s: &[Local; 3], g: &[Local; 3], gr: &Local, x: &Local, r: f64) -> Block {
+    let mut out = [[0.0; 4]; 4];
+    for i in TURNING {
+        for j in TURNING.into_iter().filter(|j| *j <= i) {
+            out[i][j] = s[0][i] * g[0][j]
+                + s[1][i] * g[1][j]
+                + s[2][i] * g[2][j]
+                + r * (w[i][j] - gr[i] * x[j] - x[i] * gr[j]);
+        }
+    }
+    out[2] = w[2].map(|w| r * w);
+    out
 }
 
 impl VertexMeasures {
@@ -115,17 +138,29 @@ impl VertexMeasures {
     }
 
     /// Energy ½ΣB(f − f̄)² of this vertex, and `more` of its twist, with their derivatives; `b` are EI₁/l̄, EI₂/l̄,
-    /// GJ/l̄.
+    /// GJ/l̄. The geometric stiffness is that of the moments `expected`, or else of the present ones.
     #[inline]
-    pub(crate) fn energy(&self, b: &[f64; 3], rest: &[f64; 3], more: &Twisting) -> VertexEnergy {
+    pub(crate) fn energy(
+        &self,
+        b: &[f64; 3],
+        rest: &[f64; 3],
+        more: &Twisting,
+        expected: Option<&[f64; 3]>,
+    ) -> VertexEnergy {
         let mut m: [f64; 3] = std::array::from_fn(|i| b[i] * (self.value[i] - rest[i]));
         let energy = 0.5 * (0..3).map(|i| m[i] * (self.value[i] - rest[i])).sum::<f64>() + more.energy;
         m[2] += more.moment;
         let b = &[b[0], b[1], b[2] + more.tangent];
-        let sum = |g: &[Local; 3]| -> Local {
+        let sum = |m: &[f64; 3], g: &[Local; 3]| -> Local {
             std::array::from_fn(|i| m[0] * g[0][i] + m[1] * g[1][i] + m[2] * g[2][i])
         };
-        let (g0, g1) = (sum(&self.before), sum(&self.after));
+        let (g_before, g_after) = (sum(&m, &self.before), sum(&m, &self.after));
+        let moments = m;
+        let m = expected.unwrap_or(&m);
+        let (g0, g1) = match expected {
+            Some(m) => (sum(m, &self.before), sum(m, &self.after)),
+            None => (g_before, g_after),
+        };
         let d = &self.d;
         let (d11, d12, d13) = (d[0][0], d[0][1], d[0][2]);
         let (d21, d22, d23) = (d[1][0], d[1][1], d[1][2]);
@@ -191,28 +226,17 @@ impl VertexMeasures {
         let (x0, x1) = ([d13, d23, 0.0, 0.0], [d31, d32, 0.0, 0.0]);
         let scaled = |g: &[Local; 3]| -> [Local; 3] { std::array::from_fn(|f| g[f].map(|v| b[f] * v)) };
         let (s0, s1) = (scaled(&self.before), scaled(&self.after));
-        let lower = |w: &Block, s: &[Local; 3], g: &[Local; 3], gr: &Local, x: &Local| -> Block {
-            let mut out = [[0.0; 4]; 4];
-            for i in 0..4 {
-                for j in 0..=i {
-                    out[i][j] = s[0][i] * g[0][j]
-                        + s[1][i] * g[1][j]
-                        + s[2][i] * g[2][j]
-                        + r * (w[i][j] - gr[i] * x[j] - x[i] * gr[j]);
-                }
-            }
-            out
-        };
-        let before = lower(&w0, &s0, &self.before, &g0, &x0);
-        let after = lower(&w1, &s1, &self.after, &g1, &x1);
-        let mixed = std::array::from_fn(|i| {
-            std::array::from_fn(|j| {
-                s0[0][i] * self.after[0][j]
+        let before = lower(&w0, &s0, &self.before, &g0, &x0, r);
+        let after = lower(&w1, &s1, &self.after, &g1, &x1, r);
+        let mut mixed = [[0.0; 4]; 4];
+        for i in TURNING {
+            for j in TURNING {
+                mixed[i][j] = s0[0][i] * self.after[0][j]
                     + s0[1][i] * self.after[1][j]
                     + s0[2][i] * self.after[2][j]
-                    + r * (w01[i][j] - g0[i] * x1[j] - x0[i] * g1[j])
-            })
-        });
-        VertexEnergy { energy, g_before: g0, g_after: g1, before, after, mixed }
+                    + r * (w01[i][j] - g0[i] * x1[j] - x0[i] * g1[j]);
+            }
+        }
+        VertexEnergy { energy, g_before, g_after, before, after, mixed, moments, tangents: *b }
     }
 }

@@ -77,6 +77,7 @@ impl StationStrain {
     }
 
     /// Axial strain ε_z at c = (x along m₁, y along m₂), mm.
+    #[inline(always)]
     pub fn axial_strain(&self, x: f64, y: f64) -> f64 {
         let change = (self.kappa1 - self.rest_kappa1) * x + (self.kappa2 - self.rest_kappa2) * y;
         let helix = if self.wagner { self.helix() * (x * x + y * y) } else { 0.0 };
@@ -84,11 +85,13 @@ impl StationStrain {
     }
 
     /// ½(τ² − τ̄²), 1/mm².
+    #[inline(always)]
     fn helix(&self) -> f64 {
         0.5 * (self.twist * self.twist - self.rest_twist * self.rest_twist)
     }
 
     /// Engineering shear strains (γ_xz, γ_yz) of an elliptic section at (x, y), mm.
+    #[inline(always)]
     pub fn shear_strains(&self, x: f64, y: f64) -> [f64; 2] {
         let rate = self.twist - self.rest_twist;
         let (a2, b2) = (self.a * self.a, self.b * self.b);
@@ -105,6 +108,7 @@ impl StationStrain {
     }
 
     /// That of an ellipse at (a c, b s).
+    #[inline(always)]
     fn ellipse_stress(&self, (c, s): (f64, f64), e: f64, g: f64) -> (f64, f64) {
         let (x, y) = (self.a * c, self.b * s);
         let axial = e * self.axial_strain(x, y);

@@ -13,7 +13,9 @@ mod track;
 
 pub use soft_maximum::{Level, Sampled, SoftForm};
 
-use crate::equilibrium::{Equilibrium, Layout, Model, PointForce, PointForceChange, Sensitivity};
+use crate::equilibrium::{
+    Equilibrium, Layout, Model, PointForce, PointForceChange, Sensitivity, SensitivityWorkspace,
+};
 use crate::geometry::SkeletonCapsule;
 use crate::ir::{Design, ObjectiveKind};
 use crate::math::skew;
@@ -41,11 +43,13 @@ pub struct StateView<'a> {
 }
 
 /// Derivatives of a state's equilibria.
-pub struct StatesSensitivity {
+pub struct StatesSensitivity<'a> {
     /// Of the equilibrium without loads.
     pub free: Sensitivity,
     /// Of those under each load case.
     pub loaded: Vec<Sensitivity>,
+    /// What `free` was computed with last: strains are only worked out for rods that need them.
+    pub workspace: &'a SensitivityWorkspace,
 }
 
 /// A term of the objective, a sum over states.

@@ -6,7 +6,8 @@
 
 use super::{Level, Objective, STEPS_OF_WEIGHTS, Sampled, StateView, StatesSensitivity};
 use crate::optimize::Normal;
-use crate::rod::{PARAMETERS, SECTION_POINTS};
+use crate::rod::{PARAMETERS, SECTION_POINTS, StrainJacobian};
+use nalgebra::{DMatrix, DVector, SVector};
 
 /// See the module.
 pub struct StressBelow {
@@ -66,13 +67,19 @@ impl Objective for StressBelow {
 /// Sums in each rod's own directions first, chained to the design parameters once.
 pub(super) struct OwnDirections<'a> {
     view: &'a StateView<'a>,
-    at: &'a StatesSensitivity,
-    rods: Vec<Option<Normal>>,
+    at: &'a StatesSensitivity<'a>,
+    rods: Vec<Option<Own>>,
+}
+
+/// One rod's strains and its sum.
+struct Own {
+    strains: StrainJacobian,
+    sum: Normal,
 }
 
 impl<'a> OwnDirections<'a> {
-    pub(super) fn new(view: &'a StateView<'a>, at: &'a StatesSensitivity) -> Self {
-        Self { view, at, rods: vec![None; view.model.rods.len()] }
+    pub(super) fn new(view: &'a StateView<'a>, at: &'a StatesSensitivity<'a>) -> Self {
+        Self { view, at, rods: view.model.rods.iter().map(|_| None).collect() }
     }
 
     /// Calls `f(sum of the rod, gradient of the stress at the sample)`.
@@ -83,20 +90,79 @@ impl<'a> OwnDirections<'a> {
         point: usize,
         f: impl FnOnce(&mut Normal, &[f64]),
     ) {
-        let jacobian = &self.at.free.strains[rod];
-        if let Some((_, d)) = jacobian.stress(&self.view.model.rods[rod].rod, station, point) {
+        if self.rods[rod].is_none() {
+            let strains = self.at.workspace.strains(self.view.model, rod);
+            self.rods[rod] = strains.map(|strains| Own { strains, sum: Normal::new(12 + PARAMETERS) });
+        }
+        let Some(own) = &mut self.rods[rod] else { return };
+        if let Some((_, d)) = own.strains.stress(&self.view.model.rods[rod].rod, station, point) {
             let mut row = [0.0; 12 + PARAMETERS];
             row[..12].copy_from_slice(d.link.as_slice());
             row[12..].copy_from_slice(d.parameters.as_slice());
-            f(self.rods[rod].get_or_insert_with(|| Normal::new(row.len())), &row);
+            f(&mut own.sum, &row);
         }
     }
 
+    /// With Z the links by the design parameters and Q the rod's parameters by them, of which few columns are not
+    /// zero, a rod adds Zᵀ G_zz Z + Zᵀ G_zq Q + Qᵀ G_qz Z + Qᵀ G_qq Q. The rods are summed before the products with
+    /// Z: they share it.
     pub(super) fn chain(mut self, out: &mut Normal) {
-        for (normal, chain) in self.rods.iter_mut().zip(&self.at.free.directions) {
-            if let Some(normal) = normal {
-                normal.complete();
-                out.add_chained(normal, chain);
+        let model = self.view.model;
+        let links = &self.at.free.links;
+        let (dofs, n) = links.shape();
+        // Zᵀ W + Wᵀ Z with W = ½ G_zz Z + G_zq Q.
+        let mut by_links = DMatrix::zeros(dofs, dofs);
+        let mut w = DMatrix::zeros(dofs, n);
+        let (mut gradient, mut tilt) = (DVector::zeros(dofs), DVector::zeros(dofs));
+        let mut any = false;
+        for (own, rod) in self.rods.iter_mut().zip(&model.rods) {
+            let Some(Own { sum, .. }) = own else { continue };
+            any = true;
+            sum.complete();
+            out.cost += sum.cost;
+            let firsts = rod.bodies.map(|body| model.layout.bodies[body].first_dof);
+            for (half, first) in firsts.iter().enumerate() {
+                let Some(first) = *first else { continue };
+                for (other, column) in firsts.iter().enumerate() {
+                    let Some(column) = *column else { continue };
+                    let mut to = by_links.fixed_view_mut::<6, 6>(first, column);
+                    to += sum.gauss_newton.fixed_view::<6, 6>(6 * half, 6 * other);
+                }
+                let mut to = gradient.fixed_rows_mut::<6>(first);
+                to += sum.gradient.fixed_rows::<6>(6 * half);
+                let mut to = tilt.fixed_rows_mut::<6>(first);
+                to += sum.tilt.fixed_rows::<6>(6 * half);
+            }
+            let own_columns: Vec<(usize, SVector<f64, PARAMETERS>)> = (0..n)
+                .filter(|c| rod.dq_dp.column(*c).iter().any(|v| *v != 0.0))
+                .map(|c| (c, rod.dq_dp.fixed_view::<PARAMETERS, 1>(0, c).into_owned()))
+                .collect();
+            let by_own = sum.gauss_newton.columns(12, PARAMETERS);
+            for (c, q) in &own_columns {
+                let g = by_own * q;
+                for (half, first) in firsts.iter().enumerate() {
+                    if let Some(first) = *first {
+                        let mut to = w.fixed_view_mut::<6, 1>(first, *c);
+                        to += g.fixed_rows::<6>(6 * half);
+                    }
+                }
+                for (r, other) in own_columns.iter().filter(|(r, _)| r >= c) {
+                    out.gauss_newton[(*r, *c)] += other.dot(&g.fixed_rows::<PARAMETERS>(12));
+                }
+                out.gradient[*c] += q.dot(&sum.gradient.fixed_rows::<PARAMETERS>(12));
+                out.tilt[*c] += q.dot(&sum.tilt.fixed_rows::<PARAMETERS>(12));
+            }
+        }
+        if !any {
+            return;
+        }
+        w += (by_links * links) * 0.5;
+        out.gradient.gemv_tr(1.0, links, &gradient, 1.0);
+        out.tilt.gemv_tr(1.0, links, &tilt, 1.0);
+        let product = links.transpose() * w;
+        for c in 0..n {
+            for r in c..n {
+                out.gauss_newton[(r, c)] += product[(r, c)] + product[(c, r)];
             }
         }
     }
