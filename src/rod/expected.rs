@@ -4,8 +4,8 @@
 //! leaves axial forces far beyond those of any equilibrium near. Newton's method then spends its iterations on them, or
 //! finds a Hessian that is not definite. Where the geometric stiffness is formed with the forces *expected* by the
 //! linear increment, as if they were unknowns of their own, it does neither: the residual, and so what is converged to,
-//! stay the same (Magisano, Leonetti & Garcea, Comput. Methods Appl. Mech. Eng. 313 (2017) 850, "mixed integration
-//! point"). At an accepted state the Hessian is the exact one.
+//! stay the same (Magisano, Leonetti & Garcea, Comput. Methods Appl. Mech. Eng. 313 (2017), "mixed integration
+//! points"). At an accepted state the Hessian is the exact one.
 
 use super::Rod;
 use super::assemble::{FIRST_INTERNAL, RodSystem, end_coordinates};
