@@ -206,6 +206,9 @@ fn a_motor_in_common_bears_both_halves() {
     assert!(largest > 1.5 * one, "{largest} of two, {one} of one");
 }
 
+/// Rounding of coordinates of 100 mm, summed over a cycle, mm: 1e-15 measured.
+const PLACED_MM: f64 = 1e-11;
+
 #[test]
 fn equal_instances_are_solved_once_and_simulated_once() {
     let stages =
@@ -216,7 +219,15 @@ fn equal_instances_are_solved_once_and_simulated_once() {
     // Three instances, one of them scaled: two designs, each solved once, simulated before and after.
     assert_eq!((stages.optimized.get(), stages.simulated.get()), (2, 4));
     let after = out.after.unwrap();
-    assert_eq!(after.traces["one.tip"], after.traces["two.tip"]);
+    // They stand elsewhere: sums along the path are rounded differently.
+    let [one, two] = ["one.tip", "two.tip"].map(|n| &after.traces[n]);
+    for (a, b) in [
+        (one.mean_error_mm, two.mean_error_mm),
+        (one.max_error_mm, two.max_error_mm),
+        (one.path_length_mm, two.path_length_mm),
+    ] {
+        assert!((a - b).abs() < PLACED_MM, "{a} {b}");
+    }
     assert_ne!(after.traces["one.tip"], after.traces["big.tip"]);
     let texts: Vec<&str> = out.requirements.iter().map(|r| r.text.as_str()).collect();
     assert_eq!(
