@@ -24,6 +24,8 @@ fn wrong_usage_is_2() {
         &["build", "a.mech", "--steps", "0"],
         &["build", "a.mech", "--threads", "many"],
         &["build", "a.mech", "--fresh", "--frozen"],
+        &["build", "a.mech", "--fresh", "--resume"],
+        &["build", "a.mech", "--resume", "--frozen"],
         &["build", "a.mech", "--format", "xml"],
         &["check", "a.mech", "--rigid"],
     ] {

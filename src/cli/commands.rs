@@ -125,6 +125,7 @@ pub fn build(arguments: &Build) -> u8 {
         Err(why) => return finish_build(unopened(&why), common.format, &[]),
     };
     opened.request.fresh = arguments.fresh;
+    opened.request.resume = arguments.resume;
     opened.request.frozen = arguments.frozen;
     let lock_path = match opened.read_lock(common, &arguments.out) {
         Ok(path) => path,

@@ -81,8 +81,11 @@ struct Build {
     /// Ignore the lock and solve from the design's own start
     #[arg(long)]
     fresh: bool,
-    /// Refuse to solve: the lock must belong to the design
+    /// Go on from the lock where its solution had not converged
     #[arg(long, conflicts_with = "fresh")]
+    resume: bool,
+    /// Refuse to solve: the lock must belong to the design
+    #[arg(long, conflicts_with_all = ["fresh", "resume"])]
     frozen: bool,
     /// Iterations of the optimiser at most; the best point found is kept
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(0..=100_000))]

@@ -191,7 +191,7 @@ impl Stages for Compiler {
             let message = format!("the optimiser was still improving after {} iterations", found.iterations);
             diagnostics.push(
                 Diagnostic::warning("W0610", message, design.origin)
-                    .help("take the result if it is good enough, or give it more with `--iterations`"),
+                    .help("take the result if it is good enough, or go on from it with `--resume`"),
             );
         }
         Ok(Solved {

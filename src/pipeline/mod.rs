@@ -45,6 +45,8 @@ pub struct Request {
     pub lock: Option<(String, String)>,
     /// Ignore the lock, and what has been made before.
     pub fresh: bool,
+    /// Go on from a lock whose solution had not converged.
+    pub resume: bool,
     /// Refuse to solve: the lock must be current.
     pub frozen: bool,
 }
@@ -293,11 +295,11 @@ fn solve(
     out: &mut BuildOutcome,
 ) -> Option<Solution> {
     let start = match lock {
-        Some((lock, LockState::Current)) => {
+        Some((lock, LockState::Current)) if !request.resume || lock.solution.converged => {
             if !lock.solution.converged {
                 out.diagnostics.push(
                     Diagnostic::warning("W0712", "the lock's solution had not converged", design.origin)
-                        .help("`--fresh` solves the design again"),
+                        .help("`--resume` goes on from it, `--fresh` solves the design from its own start"),
                 );
             }
             out.solved_from = Origin::Lock;
@@ -334,7 +336,7 @@ fn solve(
     if solved.interrupted {
         out.diagnostics.push(
             Diagnostic::warning("W0713", "the optimisation was interrupted", design.origin)
-                .help("the best point found is kept in the lock; `--fresh` solves the design again"),
+                .help("the best point found is kept in the lock; `--resume` goes on from it"),
         );
     }
     Some(solved.solution)

@@ -283,6 +283,14 @@ fn an_interrupted_run_keeps_its_best_point_and_says_so() {
     assert_eq!(codes(&out), ["W0713"]);
     assert!(out.lock.as_ref().unwrap().contains("converged false"));
     assert_eq!(codes(&run(&toy, &with_lock(&out), false)), ["W0712"]);
+    // Asked to, it goes on; a solution that has converged stays.
+    let resume = |out: &BuildOutcome| Request { resume: true, ..with_lock(out) };
+    let before = toy.solved.get();
+    let on = run(&toy, &resume(&out), false);
+    assert_eq!((codes(&on).len(), on.solved_from, toy.solved.get()), (0, Origin::OldLock, before + 1));
+    assert!(on.lock.as_ref().unwrap().contains("converged true"));
+    let again = run(&toy, &resume(&on), false);
+    assert_eq!((again.solved_from, toy.solved.get()), (Origin::Lock, before + 1));
 }
 
 #[test]
