@@ -323,7 +323,7 @@ fn papers_terms(text: &str) -> String {
         // The paper's sway asks for the normal of a path in a plane; in space it goes along both normals.
         if trace.get(3).is_some_and(|w| w != "direction") {
             let form = if text.contains(" ball ") { "" } else { ", form = paper" };
-            terms.push(format!("sway({}, force = 1 N{form})", trace[1]));
+            terms.push(format!("sway({}, force = 0.1 N{form})", trace[1]));
         }
     }
     for drive in lines("drive") {

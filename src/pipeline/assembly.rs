@@ -3,6 +3,7 @@
 use super::aims::AimSeries;
 use super::measure::{check_requirement, check_requirements, is_closed, measure};
 use super::report::{Measures, Place, RequirementResult, Worst};
+use super::stability::{DriveValues, Stability};
 use super::stages::{Between, Simulation};
 use crate::diagnostic::Diagnostic;
 use crate::emit::csv::{MotionState, MotionTable};
@@ -18,7 +19,7 @@ pub fn place(assembly: &Assembly, designs: &[Simulation]) -> Vec<Simulation> {
         return designs.to_vec();
     }
     let pairs = assembly.placed().filter_map(|(i, d)| Some((i, d, designs.get(i.design)?)));
-    let mut placed: Vec<Simulation> = pairs.map(|(i, d, s)| placed_simulation(i, d, s)).collect();
+    let mut placed: Vec<Simulation> = pairs.map(|(i, d, s)| placed_simulation(assembly, i, d, s)).collect();
     for motor in 0..assembly.motors.len() {
         let members: Vec<(usize, usize, f64)> = assembly.members(motor).collect();
         if members.len() < 2 {
@@ -42,7 +43,12 @@ pub fn place(assembly: &Assembly, designs: &[Simulation]) -> Vec<Simulation> {
     placed
 }
 
-fn placed_simulation(instance: &Instance, design: &Design, simulation: &Simulation) -> Simulation {
+fn placed_simulation(
+    assembly: &Assembly,
+    instance: &Instance,
+    design: &Design,
+    simulation: &Simulation,
+) -> Simulation {
     let table = &simulation.motion;
     let order = |n: usize| (0..n).map(|s| instance.state(s));
     let states = order(table.states.len()).filter_map(|s| table.states.get(s));
@@ -63,9 +69,28 @@ fn placed_simulation(instance: &Instance, design: &Design, simulation: &Simulati
         worst: placed_worst(instance, &simulation.worst),
         aims,
         // What a motor in common would do released is not known from one half.
-        stability: if instance.name.is_empty() { simulation.stability.clone() } else { Default::default() },
+        stability: match instance.drives.iter().all(|d| users(assembly, d.motor) == 1) {
+            true => placed_stability(instance, &simulation.stability),
+            false => Default::default(),
+        },
         diagnostics: Vec::new(),
     }
+}
+
+/// How many drives have a motor.
+fn users(assembly: &Assembly, motor: usize) -> usize {
+    assembly.instances.iter().flat_map(|i| &i.drives).filter(|d| d.motor == motor).count()
+}
+
+/// Rest states by the assembly's names of the drives. An instance whose motors are its own goes through the design's states
+/// in their order.
+fn placed_stability(instance: &Instance, stability: &Stability) -> Stability {
+    let drives = |d: &DriveValues| d.iter().map(|(name, v)| (instance.of(name), *v)).collect();
+    let mut out = stability.clone();
+    out.rest_states.iter_mut().for_each(|r| r.drives = drives(&r.drives));
+    out.limit_points.iter_mut().for_each(|l| l.drives = drives(&l.drives));
+    out.snaps.iter_mut().for_each(|s| s.drives = drives(&s.drives));
+    out
 }
 
 /// Names and states as the assembly has them.
@@ -220,6 +245,12 @@ pub fn measure_all(assembly: &Assembly, placed: &[Simulation], between: &Between
         all.stress.max_mpa = more(all.stress.max_mpa, own.stress.max_mpa, f64::max);
         all.gap.least_mm = more(all.gap.least_mm, own.gap.least_mm, f64::min);
         worst.take(&simulation.worst);
+        // Equal instances, and images, say the same.
+        if assembly.instances.iter().position(|n| n.design == instance.design) == Some(i) {
+            all.stability.rest_states.extend(own.stability.rest_states);
+            all.stability.limit_points.extend(own.stability.limit_points);
+            all.stability.snaps.extend(own.stability.snaps);
+        }
     }
     worst.take(&between.worst);
     all.gap.least_mm =
