@@ -257,6 +257,9 @@ fn shares(arguments: &Arguments) {
             });
             let problem = Problem::new(&design, &layout, EDGES);
             let x = problem.start();
+            if problem.simulate(&x).is_none() {
+                return println!("| {terms} | a state or a load of the start has no equilibrium | | | | |");
+            }
             let (whole, ()) = least(|| {
                 let trial = problem.simulate(&x).expect("the start can be simulated");
                 problem.differentiate(&trial).expect("and differentiated");
