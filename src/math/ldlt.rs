@@ -95,8 +95,8 @@ impl Ldlt {
         }
     }
 
-    /// [`Self::solve_column`] for a block of right-hand sides, of which `b` has the rows.
-    fn solve_rows(&self, b: &mut [[f64; BLOCK]]) {
+    /// Solves for `N` right-hand sides in place, of which `b` has the rows.
+    fn solve_rows<const N: usize>(&self, b: &mut [[f64; N]]) {
         let a = &self.factors;
         let n = a.nrows();
         let mut k = 0;
@@ -107,13 +107,13 @@ impl Ldlt {
                 let (x, y) = (b[k], b[k + 1]);
                 for (i, row) in b.iter_mut().enumerate().skip(k + 2) {
                     let (p, q) = (a[(i, k)], a[(i, k + 1)]);
-                    for c in 0..BLOCK {
+                    for c in 0..N {
                         row[c] -= p * x[c] + q * y[c];
                     }
                 }
                 let (d, e, f) = (a[(k, k)], a[(k + 1, k)], a[(k + 1, k + 1)]);
                 let determinant = (d / e) * (f / e) - 1.0;
-                for c in 0..BLOCK {
+                for c in 0..N {
                     b[k][c] = ((f / e) * (x[c] / e) - y[c] / e) / determinant;
                     b[k + 1][c] = ((d / e) * (y[c] / e) - x[c] / e) / determinant;
                 }
@@ -123,12 +123,12 @@ impl Ldlt {
                 let x = b[k];
                 for (i, row) in b.iter_mut().enumerate().skip(k + 1) {
                     let p = a[(i, k)];
-                    for c in 0..BLOCK {
+                    for c in 0..N {
                         row[c] -= p * x[c];
                     }
                 }
                 let d = a[(k, k)];
-                b[k] = if d == 0.0 { [0.0; BLOCK] } else { x.map(|x| x / d) };
+                b[k] = if d == 0.0 { [0.0; N] } else { x.map(|x| x / d) };
                 k += 1;
             }
         }
@@ -137,15 +137,15 @@ impl Ldlt {
             k -= 1;
             let second = k > 0 && self.pivots[k - 1].1;
             let mut own = b[k];
-            let mut before = if second { b[k - 1] } else { [0.0; BLOCK] };
+            let mut before = if second { b[k - 1] } else { [0.0; N] };
             for (i, row) in b.iter().enumerate().skip(k + 1) {
                 let p = a[(i, k)];
-                for c in 0..BLOCK {
+                for c in 0..N {
                     own[c] -= p * row[c];
                 }
                 if second {
                     let q = a[(i, k - 1)];
-                    for c in 0..BLOCK {
+                    for c in 0..N {
                         before[c] -= q * row[c];
                     }
                 }
@@ -163,47 +163,7 @@ impl Ldlt {
 
     /// Solves A x = b in place for one right-hand side of matching length.
     pub fn solve_column(&self, b: &mut [f64]) {
-        let a = &self.factors;
-        let n = a.nrows();
-        let mut k = 0;
-        while k < n {
-            let (pivot, two) = self.pivots[k];
-            if two {
-                b.swap(k + 1, pivot);
-                let (x, y) = (b[k], b[k + 1]);
-                for i in k + 2..n {
-                    b[i] -= a[(i, k)] * x + a[(i, k + 1)] * y;
-                }
-                let (d, e, f) = (a[(k, k)], a[(k + 1, k)], a[(k + 1, k + 1)]);
-                let determinant = (d / e) * (f / e) - 1.0;
-                b[k] = ((f / e) * (x / e) - y / e) / determinant;
-                b[k + 1] = ((d / e) * (y / e) - x / e) / determinant;
-                k += 2;
-            } else {
-                b.swap(k, pivot);
-                let x = b[k];
-                for i in k + 1..n {
-                    b[i] -= a[(i, k)] * x;
-                }
-                b[k] = if a[(k, k)] == 0.0 { 0.0 } else { x / a[(k, k)] };
-                k += 1;
-            }
-        }
-        let mut k = n;
-        while k > 0 {
-            k -= 1;
-            let second = k > 0 && self.pivots[k - 1].1;
-            for i in k + 1..n {
-                b[k] -= a[(i, k)] * b[i];
-                if second {
-                    b[k - 1] -= a[(i, k - 1)] * b[i];
-                }
-            }
-            b.swap(k, self.pivots[k].0);
-            if second {
-                k -= 1;
-            }
-        }
+        self.solve_rows(b.as_chunks_mut::<1>().0);
     }
 }
 
