@@ -25,7 +25,10 @@ pub fn weighed<'d>(design: &'d Design, values: &[f64]) -> Cow<'d, Design> {
     Cow::Owned(heavy)
 }
 
-/// Solves with `solve(design, start, iterations at most, progress)`, again where the solution weighs something else.
+/// One run of the optimiser: design, start, iterations at most, progress.
+type Solve<'a> = &'a dyn Fn(&Design, &[f64], usize, &dyn Fn(&Iteration)) -> Result<Solved, Failed>;
+
+/// Solves with `solve`, again where the solution weighs something else.
 ///
 /// # Errors
 /// Those of `solve`.
@@ -34,7 +37,7 @@ pub fn rounds(
     start: &[f64],
     iterations: usize,
     on_iteration: &dyn Fn(&Iteration),
-    solve: &dyn Fn(&Design, &[f64], usize, &dyn Fn(&Iteration)) -> Result<Solved, Failed>,
+    solve: Solve,
 ) -> Result<Solved, Failed> {
     let mut heavy = weighed(design, start);
     let mut solved = solve(&heavy, start, iterations, on_iteration)?;
