@@ -12,8 +12,8 @@ use std::collections::BTreeMap;
 
 /// Most steps of a cycle.
 const MAX_STEPS: f64 = 100_000.0;
-const EXPORTS: &[&str] = &["stl", "arduino"];
-const LATER_EXPORTS: &[&str] = &["threemf", "report", "gltf", "dynamixel", "micropython", "csv", "svg"];
+const EXPORTS: &[&str] = &["stl", "glb", "arduino"];
+const LATER_EXPORTS: &[&str] = &["report", "dynamixel", "micropython", "csv", "step"];
 
 impl<'a> Evaluator<'a> {
     pub(super) fn cycle(&mut self, scope: usize, sheet: &Sheet<'a>, steps: Option<usize>) -> Outcome<Cycle> {
@@ -108,8 +108,19 @@ impl<'a> Evaluator<'a> {
         };
         match name.node.as_str() {
             "stl" => {
+                let slots = self.arguments(name, args, &["place"], 0)?;
+                let kind = match slots.first().copied().flatten() {
+                    None => ExportKind::Stl,
+                    place => match self.plain_name(place, "place")? {
+                        at if at.node == "assembled" => ExportKind::StlAssembled,
+                        other => return self.unknown_of(other, "place of parts", &["assembled"]),
+                    },
+                };
+                Ok(Export { kind, origin: e.at })
+            }
+            "glb" => {
                 self.arguments(name, args, &[], 0)?;
-                Ok(Export { kind: ExportKind::Stl, origin: e.at })
+                Ok(Export { kind: ExportKind::Glb, origin: e.at })
             }
             "arduino" => {
                 let slots = self.arguments(name, args, &["drive"], 1)?;

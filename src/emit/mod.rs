@@ -2,5 +2,8 @@
 
 pub mod arduino;
 pub mod csv;
+pub mod glb;
 pub mod lock;
+mod normals;
+pub mod scene;
 pub mod stl;

@@ -335,12 +335,19 @@ impl Whole {
         groups(&self.input)
     }
 
-    /// The printed solid of a group, in as many pieces as it is, the largest first.
+    /// The printed solid of a group, in as many pieces as it is, the largest first, and the links of its bodies.
     ///
     /// # Errors
     /// A failure of the boolean kernel.
-    pub fn build(&self, group: &[usize]) -> Result<Vec<Mesh>, GeometryError> {
-        Ok(pieces(&build_part(&self.input, &self.plans, &self.carving, group)?.mesh))
+    pub fn build(&self, group: &[usize]) -> Result<(Vec<Mesh>, Vec<Mesh>), GeometryError> {
+        let part = build_part(&self.input, &self.plans, &self.carving, group)?;
+        Ok((pieces(&part.mesh), part.links))
+    }
+
+    /// The flexures of a group, by their indices in the whole.
+    pub fn flexures_of(&self, group: &[usize]) -> Vec<usize> {
+        let inside = |f: &usize| self.input.flexures.get(*f).is_some_and(|f| group.contains(&f.bodies.0));
+        (0..self.input.flexures.len()).filter(inside).collect()
     }
 
     /// What overlaps or comes too near in the rest pose.

@@ -157,6 +157,8 @@ pub struct Part {
     pub bodies: Vec<usize>,
     /// Closed, oriented mesh in the rest pose, mm, coordinates exact in `f32`.
     pub mesh: Mesh,
+    /// Of each body the link by itself, without flexures.
+    pub links: Vec<Mesh>,
     /// What the maker should know, one sentence each.
     pub notes: Vec<String>,
 }
@@ -251,7 +253,7 @@ fn build_planned(
         }
         let name = bodies.first().map(|i| input.bodies[*i].name.clone()).unwrap_or_default();
         let notes = bodies.iter().flat_map(|i| plans[*i].notes.iter().cloned()).collect();
-        Ok(Part { name, bodies: bodies.clone(), mesh: Mesh::default(), notes })
+        Ok(Part { name, bodies: bodies.clone(), mesh: Mesh::default(), links: Vec::new(), notes })
     };
     let parts = groups.par_iter().map(build).collect::<Result<Vec<Part>, GeometryError>>()?;
     Ok(Parts { parts, plans, carving, fusions })
@@ -304,11 +306,12 @@ pub(super) fn build_part(
         .collect::<Result<_, BooleanError>>()
         .map_err(failed)?;
     let inside = |f: &&FlexureSolid| bodies.contains(&f.bodies.0);
+    let links = solids.clone();
     solids.extend(input.flexures.iter().filter(inside).map(|f| f.mesh(input.facets.around)));
     let united = union_all(&solids).map_err(failed)?;
     let mesh = without_short_edges(&united, SHORT_EDGE_MM).rounded_to_f32().sorted();
     let notes = bodies.iter().flat_map(|i| plans[*i].notes.iter().cloned()).collect();
-    Ok(Part { name, bodies: bodies.to_vec(), mesh, notes })
+    Ok(Part { name, bodies: bodies.to_vec(), mesh, links, notes })
 }
 
 fn validate(input: &PartsInput) -> Result<(), GeometryError> {

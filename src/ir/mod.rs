@@ -622,8 +622,19 @@ pub struct Export {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ExportKind {
-    /// One binary STL per printed part.
+    /// One binary STL per printed part, as it lies on the bed.
     Stl,
+    /// The same where the part is in the rest pose of the assembly.
+    StlAssembled,
+    /// One binary glTF of the whole, moving.
+    Glb,
     /// Arduino sketch for one drive. Index into [`Design::drives`].
     Arduino(usize),
+}
+
+impl ExportKind {
+    /// Whether it shows the printed parts.
+    pub fn of_solids(&self) -> bool {
+        !matches!(self, Self::Arduino(_))
+    }
 }

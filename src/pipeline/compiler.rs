@@ -4,15 +4,16 @@
 use super::aims::AimSeries;
 use super::gravity;
 use super::joined::{self, Solid};
+use super::products::{self, Built};
 use super::progress::Iteration;
 use super::report::{Artefact, Place, Worst};
+use super::scene::Moving;
 use super::solids;
 use super::stability;
 use super::stages::{Between, Checked, Failed, Simulation, Solved, Stages};
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
-use crate::emit::stl::stl_bytes;
 use crate::equilibrium::{Cycle, Equilibrium, Layout, Model, ModelError, SweepError, sweep};
 use crate::geometry::{follows_geometry, parts_input};
 use crate::ir::{Assembly, Design, DriveOn, ObjectiveKind, Solution};
@@ -154,7 +155,7 @@ impl Stages for Compiler {
         values: &[Vec<f64>],
     ) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
         let mut found = Vec::new();
-        let mut built = Vec::new();
+        let (mut built, mut moving) = (Vec::new(), Vec::new());
         for (d, (design, values)) in assembly.designs.iter().zip(values).enumerate() {
             solids::available(design)?;
             let design = &*gravity::weighed(design, values);
@@ -169,17 +170,14 @@ impl Stages for Compiler {
                 joined::stands_alone(assembly, d, bodies)
             })?;
             found.extend(findings);
+            moving.push(Moving::new(design, &layout, &solved, &cycle));
             built.push(Solid { input: parts_input(design, &layout, &model), parts, states });
         }
         let (parts, findings) = joined::parts(assembly, &built)?;
         found.extend(findings);
-        let mut artefacts = Vec::new();
-        for part in &parts {
-            let bytes = stl_bytes(&part.mesh).map_err(|e| {
-                vec![Diagnostic::error("E0631", format!("no STL can be written: {e}"), assembly.origin)]
-            })?;
-            artefacts.push(Artefact { name: format!("{}.stl", part.name), bytes });
-        }
+        let whole = Built { assembly, solids: &built, moving: &moving, printed: &parts };
+        let (artefacts, findings) = products::artefacts(&whole);
+        found.extend(findings);
         Ok((artefacts, found))
     }
 }

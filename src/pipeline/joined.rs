@@ -60,8 +60,14 @@ impl Planned {
 pub struct Printed {
     /// Name of its file.
     pub name: String,
+    /// What declares it.
+    pub at: Origin,
     /// Closed solids, in place.
     pub mesh: Mesh,
+    /// Its links by themselves, each with the first instance that has the body, and the body's index there.
+    pub links: Vec<((usize, usize), Mesh)>,
+    /// Its flexures: the instance and the index there.
+    pub flexures: Vec<(usize, usize)>,
 }
 
 /// All printed parts, and findings that do not stop the work.
@@ -70,8 +76,13 @@ pub struct Printed {
 /// Where parts cannot be united.
 pub fn parts(assembly: &Assembly, solids: &[Solid]) -> Result<(Vec<Printed>, Vec<Diagnostic>), Failed> {
     if let (Some(_), [alone]) = (assembly.single(), solids) {
-        let named = |part: &Part| format!("{}_{}", assembly.name, part.name);
-        let print = |part: &Part| Printed { name: named(part), mesh: part.mesh.clone() };
+        let print = |part: &Part| Printed {
+            name: format!("{}_{}", assembly.name, part.name),
+            at: assembly.origin,
+            mesh: part.mesh.clone(),
+            links: part.bodies.iter().map(|b| (0, *b)).zip(part.links.iter().cloned()).collect(),
+            flexures: flexures_of(&alone.input, &part.bodies).map(|f| (0, f)).collect(),
+        };
         return Ok((alone.parts.parts.iter().map(print).collect(), Vec::new()));
     }
     let failed = |name: &str, at: Origin| {
@@ -85,10 +96,15 @@ pub fn parts(assembly: &Assembly, solids: &[Solid]) -> Result<(Vec<Printed>, Vec
     let (mut out, mut found) = (Vec::new(), Vec::new());
     for group in whole.groups() {
         let Some((name, at)) = name(assembly, solids, &whole, &group) else { continue };
-        let pieces = match alone(assembly, solids, &whole, &group) {
-            Some(mesh) => vec![mesh],
+        let (pieces, links) = match alone(assembly, solids, &whole, &group) {
+            Some((mesh, links)) => (vec![mesh], links),
             None => whole.build(&group).map_err(failed(&name, at))?,
         };
+        let owner = |b: &usize| whole.bodies.get(*b).and_then(|m| m.first()).copied();
+        let mut links: Vec<_> =
+            group.iter().zip(links).filter_map(|(b, mesh)| Some((owner(b)?, mesh))).collect();
+        let flexures = whole.flexures_of(&group);
+        let mut flexures: Vec<_> = flexures.iter().filter_map(|f| whole.flexures.get(*f).copied()).collect();
         if pieces.len() > 1 {
             let message = format!(
                 "`{name}` is printed in {} pieces: what is to be one body does not touch",
@@ -101,7 +117,9 @@ pub fn parts(assembly: &Assembly, solids: &[Solid]) -> Result<(Vec<Printed>, Vec
         }
         for (k, mesh) in pieces.into_iter().enumerate() {
             let name = if k == 0 { name.clone() } else { format!("{name}_{}", k + 1) };
-            out.push(Printed { name, mesh });
+            // What is told of the whole part stands with its largest piece.
+            let (links, flexures) = (std::mem::take(&mut links), std::mem::take(&mut flexures));
+            out.push(Printed { name, at, mesh, links, flexures });
         }
     }
     found.extend(in_the_way(assembly, solids, &whole));
@@ -166,8 +184,14 @@ pub fn stands_alone(assembly: &Assembly, design: usize, bodies: &[usize]) -> boo
     instances.any(|(i, _)| bodies.iter().all(|b| !common(i, *b)))
 }
 
-/// A part that no other instance has a body of, in its place.
-fn alone(assembly: &Assembly, solids: &[Solid], whole: &Whole, group: &[usize]) -> Option<Mesh> {
+/// The flexures between some bodies of a design.
+fn flexures_of(input: &PartsInput, bodies: &[usize]) -> impl Iterator<Item = usize> {
+    let inside = |f: &usize| input.flexures.get(*f).is_some_and(|f| bodies.contains(&f.bodies.0));
+    (0..input.flexures.len()).filter(inside)
+}
+
+/// A part that no other instance has a body of, in its place, and its links in the order of the group.
+fn alone(assembly: &Assembly, solids: &[Solid], whole: &Whole, group: &[usize]) -> Option<(Mesh, Vec<Mesh>)> {
     let members: Vec<&(usize, usize)> = group.iter().filter_map(|b| whole.bodies.get(*b)).flatten().collect();
     let [(i, b), ..] = members.as_slice() else { return None };
     if members.len() > group.len() {
@@ -175,7 +199,12 @@ fn alone(assembly: &Assembly, solids: &[Solid], whole: &Whole, group: &[usize]) 
     }
     let instance = assembly.instances.get(*i)?;
     let part = solids.get(instance.design)?.parts.parts.iter().find(|p| p.bodies.contains(b))?;
-    Some(part.mesh.placed(&instance.placement).rounded_to_f32().sorted())
+    let link = |(_, b): &&(usize, usize)| {
+        let own = part.bodies.iter().position(|p| p == b).and_then(|k| part.links.get(k));
+        own.map(|m| m.placed(&instance.placement)).unwrap_or_default()
+    };
+    let links = members.iter().map(link).collect();
+    Some((part.mesh.placed(&instance.placement).rounded_to_f32().sorted(), links))
 }
 
 /// What a group of bodies is called, and what declares it.

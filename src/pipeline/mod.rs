@@ -8,8 +8,10 @@ mod gravity;
 mod joined;
 mod manifest;
 mod measure;
+mod products;
 mod progress;
 mod report;
+mod scene;
 mod solids;
 mod stability;
 mod stages;
@@ -148,7 +150,7 @@ fn run_build(
 
     // Values to files.
     let clock = Clock::start(progress, Stage::Mesh);
-    if assembly.exports.iter().any(|e| e.export.kind == ExportKind::Stl)
+    if assembly.exports.iter().any(|e| e.export.kind.of_solids())
         && let Some((parts, found)) = keep(stages.parts(&assembly, &values), &mut out.diagnostics)
     {
         out.artefacts.extend(parts);

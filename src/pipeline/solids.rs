@@ -9,7 +9,7 @@ use crate::geometry::{
     Carving, Cut, CycleGaps, Fusion, GeometryError, LeastGap, Member, MovedState, Parts, build_wanted_parts,
     carve, carved_cycle_gaps, flexure_solid, parts_input, plan_bodies,
 };
-use crate::ir::{Design, ExportKind, Joint, JointKind};
+use crate::ir::{Design, Joint, JointKind};
 
 /// Builds the printed parts of a design in its rest pose; links make way for their own flexures in the `states` of the
 /// cycle. Meshed is only what is `wanted`, by the bodies of a part.
@@ -54,11 +54,11 @@ pub fn available(design: &Design) -> Result<(), Failed> {
         let what = joint.kind.name();
         let message = format!("the printed form of a conventional {what} joint is not available yet");
         let found = Diagnostic::error("E0901", message, joint.origin);
-        match design.exports.iter().find(|e| e.kind == ExportKind::Stl) {
+        match design.exports.iter().find(|e| e.kind.of_solids()) {
             Some(export) => found.also(export.origin, "asked for here"),
             None => found,
         }
-        .help("without `export stl` the mechanism can be checked, simulated and solved")
+        .help("without exports of parts (`stl`, `glb`) the mechanism can be checked, simulated and solved")
     };
     let found: Vec<Diagnostic> = design.joints.iter().filter(missing).map(told).collect();
     if found.is_empty() { Ok(()) } else { Err(found) }
