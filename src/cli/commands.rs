@@ -101,7 +101,7 @@ pub fn simulate(arguments: &Simulate) -> u8 {
             render::show(&out.diagnostics, &out.sources);
             table.map_or(FINE, |table| print(&write_csv(table)))
         }
-        Format::Json => print(&format!("{}\n", motion_json(&out, table))),
+        Format::Json | Format::Sarif => print(&format!("{}\n", motion_json(&out, table))),
     };
     printed.max(code(&out))
 }
@@ -162,6 +162,9 @@ fn finish_build(out: BuildOutcome, format: Format, written: &[(String, usize)]) 
         }
         Format::Json => {
             print(&format!("{}\n", json(&out)));
+        }
+        Format::Sarif => {
+            super::sarif::print(&out.diagnostics, &out.sources);
         }
     }
     code(&out)
@@ -224,14 +227,17 @@ fn stop_on_ctrl_c(say: impl Fn() + Send + 'static) -> Arc<AtomicBool> {
 }
 
 /// A source and the folder it stands in.
-struct Opened {
-    folder: Folder,
-    request: Request,
+pub struct Opened {
+    /// Where its files are.
+    pub folder: Folder,
+    /// What is asked of it.
+    pub request: Request,
     /// Folder as the user wrote it, for messages and for the lock.
     shown: PathBuf,
 }
 
-fn open(common: &Common) -> Result<Opened, (PathBuf, FileError)> {
+/// Opens a design.
+pub fn open(common: &Common) -> Result<Opened, (PathBuf, FileError)> {
     let fail = |e| (common.source.clone(), e);
     let (folder, source) = Folder::of(&common.source).map_err(fail)?;
     // Read once here so that an unreadable source is told from an unreadable import.
@@ -251,7 +257,7 @@ fn open(common: &Common) -> Result<Opened, (PathBuf, FileError)> {
 
 impl Opened {
     /// Gives the design's files the names by which the user can reach them: editors jump to these.
-    fn name_as_written(&self, sources: &mut SourceMap) {
+    pub fn name_as_written(&self, sources: &mut SourceMap) {
         for file in &mut sources.files {
             if file.name.ends_with(".mech") && !file.name.starts_with("std/") {
                 file.name = self.shown.join(&file.name).display().to_string();
@@ -260,7 +266,7 @@ impl Opened {
     }
 
     /// Reads the lock, if there is one; returns where it belongs.
-    fn read_lock(&mut self, common: &Common, out: &Path) -> Result<PathBuf, (PathBuf, FileError)> {
+    pub fn read_lock(&mut self, common: &Common, out: &Path) -> Result<PathBuf, (PathBuf, FileError)> {
         let stem = self.request.source.strip_suffix(".mech").unwrap_or(&self.request.source);
         let name = format!("{stem}.lock");
         let tried_out = !common.overrides.is_empty() || common.steps.is_some();
@@ -281,7 +287,7 @@ fn unreadable(common: &Common, why: &(PathBuf, FileError)) -> u8 {
 }
 
 /// The outcome when not even the first file could be read.
-fn unopened((path, why): &(PathBuf, FileError)) -> BuildOutcome {
+pub fn unopened((path, why): &(PathBuf, FileError)) -> BuildOutcome {
     let message = format!("cannot read `{}`: {why}", path.display());
     BuildOutcome {
         diagnostics: vec![placeless(Severity::Error, "E0730", message)],

@@ -4,11 +4,14 @@
 mod artefacts;
 mod commands;
 mod human;
+mod junit;
 mod progress;
 mod released;
 mod render;
+mod sarif;
 mod sources;
 mod style;
+mod test;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -42,6 +45,8 @@ enum Command {
     Simulate(Simulate),
     /// Print the elaborated design as JSON
     Ir(Common),
+    /// Check the `require` lines of many designs
+    Test(test::Test),
 }
 
 /// What every command takes.
@@ -69,6 +74,8 @@ enum Format {
     Human,
     /// For scripts: exactly one JSON object on the standard output
     Json,
+    /// For code review services: the findings as SARIF 2.1.0 (check and build)
+    Sarif,
 }
 
 #[derive(Debug, Args)]
@@ -149,12 +156,17 @@ pub fn main() -> ExitCode {
         Command::Check(common) | Command::Ir(common) => common.threads,
         Command::Build(build) => build.common.threads,
         Command::Simulate(simulate) => simulate.common.threads,
+        Command::Test(test) => test.threads,
     };
+    if let Command::Simulate(Simulate { common, .. }) | Command::Ir(common) = &cli.command {
+        sarif::refuse(common.format);
+    }
     let run = || match &cli.command {
         Command::Check(common) => commands::check(common),
         Command::Build(arguments) => commands::build(arguments),
         Command::Simulate(arguments) => commands::simulate(arguments),
         Command::Ir(common) => commands::ir(common),
+        Command::Test(arguments) => test::run(arguments),
     };
     let code = match threads {
         None => run(),

@@ -43,6 +43,15 @@ impl Terminal {
     }
 }
 
+/// Nothing is shown: several designs are worked on at a time.
+pub struct Silent;
+
+impl Progress for Silent {
+    fn seconds(&self) -> f64 {
+        0.0
+    }
+}
+
 impl Progress for Terminal {
     fn seconds(&self) -> f64 {
         self.began.elapsed().as_secs_f64()

@@ -32,6 +32,9 @@ pub fn report(found: &[Diagnostic], sources: &SourceMap, format: Format) {
         Format::Json => {
             super::commands::print(&format!("{}\n", json!({ "diagnostics": json(found, sources) })));
         }
+        Format::Sarif => {
+            super::sarif::print(found, sources);
+        }
     }
 }
 

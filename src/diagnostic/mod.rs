@@ -2,6 +2,7 @@
 //! nothing here knows how a finding is shown.
 
 pub mod json;
+pub mod sarif;
 pub mod terminal;
 
 use serde::{Deserialize, Serialize};

@@ -4,6 +4,7 @@
 mod aims;
 mod assembly;
 mod compiler;
+mod examine;
 mod gravity;
 mod joined;
 mod manifest;
@@ -18,6 +19,7 @@ mod stages;
 
 pub use aims::{AimSeries, DirectionMeasures, OutputMeasures};
 pub use compiler::{Compiler, EDGES};
+pub use examine::{Examined, Values, examine};
 pub use manifest::COMPILER;
 pub use measure::{aggregate, check_requirements, is_closed, measure};
 pub use progress::{Iteration, Progress, Stage};
@@ -300,10 +302,7 @@ fn solve(
     let start = match lock {
         Some((lock, LockState::Current)) if !request.resume || lock.solution.converged => {
             if !lock.solution.converged {
-                out.diagnostics.push(
-                    Diagnostic::warning("W0712", "the lock's solution had not converged", design.origin)
-                        .help("`--resume` goes on from it, `--fresh` solves the design from its own start"),
-                );
+                out.diagnostics.push(not_converged(design));
             }
             out.solved_from = Origin::Lock;
             return Some(lock.solution);
@@ -367,6 +366,35 @@ fn read_locks(
             Err(())
         }
     }
+}
+
+/// The lock's solution of every design for which it is current; if it `must` be, others are errors unless they have
+/// nothing to decide.
+fn check_locked(
+    request: &Request,
+    assembly: &Assembly,
+    must: bool,
+    out: &mut BuildOutcome,
+) -> Option<Vec<Option<Solution>>> {
+    let locks = read_locks(request, assembly, out).ok()?;
+    let mut solutions = Vec::new();
+    let mut missing = Vec::new();
+    for (design, lock) in assembly.designs.iter().zip(locks) {
+        let current = lock.filter(|(_, state)| *state == LockState::Current).map(|(lock, _)| lock.solution);
+        match &current {
+            Some(solution) if !solution.converged => out.diagnostics.push(not_converged(design)),
+            None if must && !design.free.is_empty() => missing.push(examine::not_locked(request, design)),
+            _ => {}
+        }
+        solutions.push(current);
+    }
+    tell_once(missing.iter().cloned(), out);
+    missing.is_empty().then_some(solutions)
+}
+
+fn not_converged(design: &Design) -> Diagnostic {
+    Diagnostic::warning("W0712", "the lock's solution had not converged", design.origin)
+        .help("`--resume` goes on from it, `--fresh` solves the design from its own start")
 }
 
 fn frozen(design: &Design, request: &Request) -> Diagnostic {
