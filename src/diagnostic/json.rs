@@ -17,6 +17,33 @@ pub struct JsonDiagnostic<'a> {
     pub labels: Vec<JsonLabel<'a>>,
     /// The next action, or null.
     pub help: Option<&'a str>,
+    /// Repairs, the best first; absent where none is known.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub fixes: Vec<JsonFix<'a>>,
+}
+
+/// A repair as JSON shows it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct JsonFix<'a> {
+    /// What it does.
+    pub title: &'a str,
+    /// It leaves what is built as it is.
+    pub safe: bool,
+    /// Texts in place of ranges that do not overlap.
+    pub edits: Vec<JsonEdit<'a>>,
+}
+
+/// A text in place of a range, as JSON shows it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct JsonEdit<'a> {
+    /// File name as in the source map; null if the file is not in it.
+    pub file: Option<&'a str>,
+    /// First byte.
+    pub start: JsonPosition,
+    /// One past the last byte.
+    pub end: JsonPosition,
+    /// What stands there afterwards.
+    pub text: &'a str,
 }
 
 /// A place as JSON shows it.
@@ -45,6 +72,20 @@ pub struct JsonPosition {
 
 /// The list of diagnostics, ready to be serialised or to become a part of a larger object.
 pub fn diagnostics<'a>(diagnostics: &'a [Diagnostic], sources: &'a SourceMap) -> Vec<JsonDiagnostic<'a>> {
+    let place = |at: super::Origin| {
+        let file = sources.files.get(at.file as usize);
+        let text = file.map_or("", |f| f.text.as_str());
+        (file.map(|f| f.name.as_str()), position(text, at.start), position(text, at.end))
+    };
+    let edit = |e: &'a super::Edit| {
+        let (file, start, end) = place(e.at);
+        JsonEdit { file, start, end, text: &e.text }
+    };
+    let fix = |f: &'a super::Fix| JsonFix {
+        title: &f.title,
+        safe: f.safe,
+        edits: f.edits.iter().map(edit).collect(),
+    };
     let one = |d: &'a Diagnostic| JsonDiagnostic {
         code: &d.code,
         severity: d.severity,
@@ -53,17 +94,12 @@ pub fn diagnostics<'a>(diagnostics: &'a [Diagnostic], sources: &'a SourceMap) ->
             .labels
             .iter()
             .map(|l| {
-                let file = sources.files.get(l.at.file as usize);
-                let text = file.map_or("", |f| f.text.as_str());
-                JsonLabel {
-                    file: file.map(|f| f.name.as_str()),
-                    text: &l.text,
-                    start: position(text, l.at.start),
-                    end: position(text, l.at.end),
-                }
+                let (file, start, end) = place(l.at);
+                JsonLabel { file, text: &l.text, start, end }
             })
             .collect(),
         help: d.help.as_deref(),
+        fixes: d.fixes.iter().map(fix).collect(),
     };
     diagnostics.iter().map(one).collect()
 }

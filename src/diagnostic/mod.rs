@@ -1,10 +1,12 @@
 //! One plain diagnostic for every stage. Renderers (terminal, JSON) live beside it, one a file;
 //! nothing here knows how a finding is shown.
 
+mod fix;
 pub mod json;
 pub mod sarif;
 pub mod terminal;
 
+pub use fix::{Edit, Fix, apply};
 use serde::{Deserialize, Serialize};
 
 /// A byte range in one source file. Opaque to the numerical stages: they carry it so that a
@@ -53,6 +55,9 @@ pub struct Diagnostic {
     pub labels: Vec<Label>,
     /// The next action, in one line.
     pub help: Option<String>,
+    /// Repairs, the best first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fixes: Vec<Fix>,
 }
 
 impl Diagnostic {
@@ -78,6 +83,7 @@ impl Diagnostic {
             message: message.into(),
             labels: vec![Label { at, text: String::new() }],
             help: None,
+            fixes: Vec::new(),
         }
     }
 
@@ -98,6 +104,12 @@ impl Diagnostic {
     /// The next action.
     pub fn help(mut self, text: impl Into<String>) -> Self {
         self.help = Some(text.into());
+        self
+    }
+
+    /// A repair.
+    pub fn fix(mut self, fix: Fix) -> Self {
+        self.fixes.push(fix);
         self
     }
 

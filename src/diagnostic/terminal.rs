@@ -64,7 +64,7 @@ impl Report {
             code: Some(printable(&diagnostic.code)),
             severity: diagnostic.severity,
             message: printable(&diagnostic.message),
-            help: diagnostic.help.as_deref().map(printable),
+            help: help(diagnostic),
             labels: here.iter().enumerate().filter_map(|(i, l)| span(l, i == 0, source)).collect(),
             source: source.map(named),
             related: elsewhere.into_iter().map(|label| Self::elsewhere(label, sources)).collect(),
@@ -83,6 +83,16 @@ impl Report {
             related: Vec::new(),
         }
     }
+}
+
+/// The next action, and by which flag the compiler takes it.
+fn help(diagnostic: &Diagnostic) -> Option<String> {
+    let fix = diagnostic.fixes.first().map(|f| {
+        let flag = if f.safe { "--fix" } else { "--unsafe-fixes" };
+        format!("`check {flag}` does it: {}", f.title)
+    });
+    let lines: Vec<&str> = diagnostic.help.as_deref().into_iter().chain(fix.as_deref()).collect();
+    (!lines.is_empty()).then(|| lines.iter().map(|l| printable(l)).collect::<Vec<_>>().join("\n"))
 }
 
 /// A file's name and text as shown. Like miette's own sources, but columns count characters, not bytes.

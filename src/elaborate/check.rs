@@ -44,7 +44,7 @@ impl<'a> Evaluator<'a> {
                     let mut d =
                         Diagnostic::error(codes::UNKNOWN_TYPE, format!("unknown type `{name}`"), ty.at);
                     d = match near {
-                        Some(n) => d.help(format!("did you mean `{n}`?")),
+                        Some(n) => super::lookup::meant(d, ty, &n),
                         None => d.help(format!(
                             "types are {}",
                             Dimension::type_names().chain(others).collect::<Vec<_>>().join(", ")

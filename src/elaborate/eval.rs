@@ -238,7 +238,7 @@ impl<'a> Evaluator<'a> {
                     part.symbol.at,
                 );
                 d = match near {
-                    Some(n) => d.help(format!("did you mean `{n}`?")),
+                    Some(n) => super::lookup::meant(d, &part.symbol, &n),
                     None => d.help(format!(
                         "units are {}",
                         units::UNITS.iter().map(|u| u.symbol).collect::<Vec<_>>().join(" ")

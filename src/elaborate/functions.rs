@@ -102,7 +102,7 @@ impl<'a> Evaluator<'a> {
         if let Some((_, text)) = ELSEWHERE.iter().find(|(n, _)| *n == name) {
             d = d.help(*text);
         } else if let Some(near) = super::names::suggestion(name, FUNCTIONS.iter().copied()) {
-            d = d.help(format!("did you mean `{near}`?"));
+            d = super::lookup::meant(d, f, &near);
         } else {
             d = d.help(format!("functions are {}", FUNCTIONS.join(", ")));
         }
@@ -140,7 +140,7 @@ impl<'a> Evaluator<'a> {
                             n.at,
                         );
                         let d = match near {
-                            Some(near) => d.help(format!("did you mean `{near}`?")),
+                            Some(near) => super::lookup::meant(d, n, &near),
                             None => d.help(usage()),
                         };
                         return self.fail(d);

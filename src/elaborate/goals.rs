@@ -60,7 +60,7 @@ impl<'a> Evaluator<'a> {
             name.at,
         );
         self.fail(match super::names::suggestion(&name.node, known.iter().copied()) {
-            Some(near) => d.help(format!("did you mean `{near}`?")),
+            Some(near) => super::lookup::meant(d, name, &near),
             None => d.help(format!("there are {}", known.join(", "))),
         })
     }

@@ -336,7 +336,7 @@ impl<'a> Evaluator<'a> {
             name.at,
         );
         self.fail(match super::names::suggestion(&name.node, names.iter().copied()) {
-            Some(near) => d.help(format!("did you mean `{near}`?")),
+            Some(near) => super::lookup::meant(d, name, &near),
             None => d.help(format!("it has {}", names.join(", "))),
         })
     }

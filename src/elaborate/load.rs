@@ -4,12 +4,16 @@
 use super::codes;
 use super::names::suggestion;
 use super::{FileError, Files};
-use crate::diagnostic::{Diagnostic, Origin, SourceMap};
+use crate::diagnostic::{Diagnostic, Edit, Fix, Origin, SourceMap};
 use crate::syntax::ast::{self, Item, UseTarget};
 use include_dir::{Dir, include_dir};
 use std::collections::BTreeMap;
 
 static STDLIB: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/stdlib");
+
+/// What paths of the standard library begin with, as shown. (A file of a design could be called so only in a folder
+/// of that name.)
+pub const STANDARD: &str = "std/";
 
 /// Longest chain of imports.
 const MAX_IMPORT_DEPTH: usize = 32;
@@ -105,7 +109,7 @@ enum Key {
 impl Key {
     fn shown(&self) -> String {
         match self {
-            Key::Std(p) => format!("std/{p}"),
+            Key::Std(p) => format!("{STANDARD}{p}"),
             Key::File(p) => p.clone(),
         }
     }
@@ -196,7 +200,11 @@ impl Loader<'_> {
                     );
                     let near = suggestion(&name, known.iter().map(String::as_str));
                     d = match near {
-                        Some(n) => d.help(format!("did you mean `use std.{n}`?")),
+                        Some(n) => {
+                            let fix = Edit::replace(at, format!("use std.{n}"));
+                            d.help(format!("did you mean `use std.{n}`?"))
+                                .fix(Fix::risky(format!("write `use std.{n}`"), vec![fix]))
+                        }
                         None => d.help(format!("it has: {}", list(&known))),
                     };
                     return Err(Box::new(d));

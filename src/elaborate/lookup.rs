@@ -5,7 +5,7 @@ use super::eval::{Evaluator, Outcome};
 use super::load::{item_name, std_modules};
 use super::names::suggestion;
 use super::scope::LocalKind;
-use crate::diagnostic::{Diagnostic, Origin};
+use crate::diagnostic::{Diagnostic, Edit, Fix, Origin};
 use crate::syntax::ast::Ident;
 use std::collections::BTreeMap;
 
@@ -13,7 +13,24 @@ fn unknown_value(name: &Ident) -> Diagnostic {
     Diagnostic::error(codes::UNKNOWN_NAME, format!("`{}` is not declared", name.node), name.at)
 }
 
+/// A guess at what was meant, with the repair.
+pub(super) fn meant(d: Diagnostic, name: &Ident, near: &str) -> Diagnostic {
+    d.help(format!("did you mean `{near}`?"))
+        .fix(Fix::risky(format!("write `{near}`"), vec![Edit::replace(name.at, near)]))
+}
+
 impl<'a> Evaluator<'a> {
+    /// The text that imports a module of the standard library: below the other imports, else below the edition, else
+    /// at the top.
+    fn import(&self, file: u32, module: &str) -> Edit {
+        let ast = self.program.modules.iter().find(|m| m.file_id == file).map(|m| &m.file);
+        let last = ast.and_then(|f| f.uses.last().map(|u| u.at).or(f.edition.as_ref().map(|e| e.at)));
+        match last {
+            Some(at) => Edit::replace(Origin { start: at.end, ..at }, format!("\nuse std.{module}")),
+            None => Edit::replace(Origin { file, start: 0, end: 0 }, format!("use std.{module}\n")),
+        }
+    }
+
     /// A name that should be a value.
     pub(super) fn unknown_name<T>(&mut self, scope: usize, name: &Ident) -> Outcome<T> {
         let Some(s) = self.scopes.get(scope) else { return Err(super::eval::Failed) };
@@ -68,9 +85,12 @@ impl<'a> Evaluator<'a> {
         }
         let in_std = std_modules().into_iter().find(|m| m.rsplit('.').next() == Some(name.node.as_str()));
         let d = match in_std {
-            Some(module) => d.help(format!("add `use std.{module}` at the top of the file")),
+            Some(module) => {
+                let d = d.help(format!("add `use std.{module}` at the top of the file"));
+                d.fix(Fix::safe("add the import", vec![self.import(name.at.file, &module)]))
+            }
             None => match self.near(&name.node, candidates.iter().map(String::as_str)) {
-                Some(near) => d.help(format!("did you mean `{near}`?")),
+                Some(near) => meant(d, name, &near),
                 None => d.label("not found here"),
             },
         };
@@ -124,7 +144,7 @@ impl<'a> Evaluator<'a> {
         let d =
             Diagnostic::error(codes::UNKNOWN_NAME, format!("there is no {kind} `{}`", name.node), name.at);
         let d = match self.near(&name.node, map.keys().map(String::as_str)) {
-            Some(near) => d.help(format!("did you mean `{near}`?")),
+            Some(near) => meant(d, name, &near),
             None if map.is_empty() => d.help(format!("the mechanism has no {kind}")),
             None => d.help(format!(
                 "there {}: {}",

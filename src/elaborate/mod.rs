@@ -45,9 +45,9 @@ mod theory;
 pub mod units;
 mod value;
 
-use crate::diagnostic::{Diagnostic, Origin, SourceMap};
+use crate::diagnostic::{Diagnostic, Edit, Fix, Origin, SourceMap};
 use crate::ir::{Assembly, Design};
-use crate::syntax::ast::{Item, Mechanism};
+use crate::syntax::ast::{self, Item, Mechanism};
 pub use load::std_modules;
 use settings::Settings;
 use std::fmt;
@@ -115,8 +115,21 @@ pub struct Elaborated {
     pub design: Option<Design>,
     /// Every text that was read: the root file first, then imports, then `--set` values.
     pub sources: SourceMap,
+    /// The design's own files as understood, the root file first.
+    pub files: Vec<OwnFile>,
     /// Findings of parsing and elaboration, in the order of the files and places.
     pub diagnostics: Vec<Diagnostic>,
+}
+
+/// A file of the design, not of the standard library, as understood.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OwnFile {
+    /// Its index in the source map.
+    pub id: u32,
+    /// Its path.
+    pub path: String,
+    /// What it says.
+    pub ast: ast::File,
 }
 
 /// Reads `root` and what it imports, and elaborates it. What is built is the *last* mechanism of the root file that
@@ -127,7 +140,7 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
     let program = load::load(root, files, &mut sources, &mut diagnostics);
     let settings = Settings::parse(&options.set, &mut sources, &mut diagnostics);
     let Some(module) = program.root.and_then(|i| Some((i, program.modules.get(i)?))) else {
-        return Elaborated { assembly: None, design: None, sources, diagnostics };
+        return Elaborated { assembly: None, design: None, sources, files: Vec::new(), diagnostics };
     };
     let (root_index, root_module) = module;
     let outside = mechanism::Outside { module: root_index, steps: options.steps, sources: &sources, files };
@@ -169,7 +182,8 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
             if root_module.imported.get(u) == Some(&true) && !used.contains(&(root_index, u)) {
                 diagnostics.push(
                     Diagnostic::warning(codes::UNUSED_IMPORT, "this import is not used", text.at)
-                        .help("remove the line"),
+                        .help("remove the line")
+                        .fix(removal(&sources, text.at)),
                 );
             }
         }
@@ -178,7 +192,18 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
     }
     tidy(&mut diagnostics);
     let design = assembly.as_ref().and_then(Assembly::single).cloned();
-    Elaborated { assembly, design, sources, diagnostics }
+    let mut files: Vec<OwnFile> = Vec::new();
+    for module in program.modules.into_iter().filter(|m| !m.path.starts_with(load::STANDARD)) {
+        files.push(OwnFile { id: module.file_id, path: module.path, ast: module.file });
+    }
+    files.sort_by_key(|f| f.id);
+    Elaborated { assembly, design, sources, files, diagnostics }
+}
+
+/// The repair that takes a statement out.
+fn removal(sources: &SourceMap, at: Origin) -> Fix {
+    let text = sources.files.get(at.file as usize).map_or("", |f| f.text.as_str());
+    Fix::safe("remove it", vec![Edit::remove(text, at)])
 }
 
 /// What a file builds, and the mechanisms that have to be checked by themselves because it does not place them.

@@ -91,7 +91,7 @@ impl<'a> Evaluator<'a> {
                 name.at,
             );
             match super::names::suggestion(&name.node, known.iter().map(|f| f.name)) {
-                Some(near) => d.help(format!("did you mean `{near}`?")),
+                Some(near) => super::lookup::meant(d, name, &near),
                 None => {
                     d.help(format!("it has {}", known.iter().map(|f| f.name).collect::<Vec<_>>().join(", ")))
                 }
@@ -169,7 +169,7 @@ impl<'a> Evaluator<'a> {
                 );
                 let near = super::names::suggestion(&name.node, known.iter().map(|f| f.name));
                 self.out.push(match near {
-                    Some(n) => d.help(format!("did you mean `{n}`?")),
+                    Some(n) => super::lookup::meant(d, name, &n),
                     None => d.help(format!(
                         "it has {}",
                         known.iter().map(|f| f.name).collect::<Vec<_>>().join(", ")

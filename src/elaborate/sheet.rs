@@ -216,6 +216,7 @@ impl<'a> Evaluator<'a> {
                 Diagnostic::error(codes::MISPLACED, "this stands in a `flexure`, not in a mechanism", at)
                     .help("declare `flexure NAME replaces hinge { … }` and use it with `as NAME`"),
             ),
+            StatementKind::Allow(_) => {}
             StatementKind::Later { keyword } => {
                 sheet.later = true;
                 let _: Result<(), _> = self.later(codes::LATER_STATEMENT, &keyword.node, keyword.at);

@@ -231,7 +231,7 @@ impl<'a> Evaluator<'a> {
         let d =
             Diagnostic::error(codes::UNKNOWN_NAME, format!("there is no kind of joint `{name}`"), kind.at);
         self.fail(match super::names::suggestion(name, kinds) {
-            Some(near) => d.help(format!("did you mean `{near}`?")),
+            Some(near) => super::lookup::meant(d, kind, &near),
             None => d.help(format!("kinds are {}", kinds.join(", "))),
         })
     }

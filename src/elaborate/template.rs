@@ -105,7 +105,7 @@ impl<'a> Evaluator<'a> {
                         Local { name: name.node.clone(), at: name.at, kind, state: State::Waiting },
                     );
                 }
-                StatementKind::Rod(_) | StatementKind::OwnBody { .. } => {}
+                StatementKind::Rod(_) | StatementKind::OwnBody { .. } | StatementKind::Allow(_) => {}
                 StatementKind::Broken { .. } => ok = Err(Failed),
                 StatementKind::Later { keyword } => {
                     ok = self.later(codes::LATER_STATEMENT, &keyword.node, keyword.at);
@@ -293,7 +293,7 @@ impl<'a> Evaluator<'a> {
                         name.at,
                     );
                     ok = self.fail(match super::names::suggestion(&name.node, params.iter().copied()) {
-                        Some(near) => d.help(format!("did you mean `{near}`?")),
+                        Some(near) => super::lookup::meant(d, name, &near),
                         None => d.help(format!("it has {}", params.join(", "))),
                     });
                 }

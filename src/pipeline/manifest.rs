@@ -194,6 +194,8 @@ pub fn recall(made: &dyn Made, source: &str, fingerprint: &Fingerprint) -> Optio
             message: f.message,
             labels: f.labels.into_iter().map(label).collect::<Option<_>>()?,
             help: f.help,
+            // A repair is a place in a text, which may be another one by now.
+            fixes: Vec::new(),
         })
     };
     let diagnostics = record.findings.into_iter().map(finding).collect::<Option<_>>()?;

@@ -467,7 +467,14 @@ impl<'a> Clock<'a> {
 
 /// A finding without a place in any file.
 pub fn placeless(severity: Severity, code: &str, message: impl Into<String>) -> Diagnostic {
-    Diagnostic { code: code.into(), severity, message: message.into(), labels: Vec::new(), help: None }
+    Diagnostic {
+        code: code.into(),
+        severity,
+        message: message.into(),
+        labels: Vec::new(),
+        help: None,
+        fixes: Vec::new(),
+    }
 }
 
 #[cfg(test)]

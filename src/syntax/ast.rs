@@ -24,6 +24,19 @@ pub struct File {
     pub uses: Vec<Use>,
     /// Top-level declarations.
     pub items: Vec<Item>,
+    /// `allow CODE "reason"` outside of blocks.
+    pub allows: Vec<Allow>,
+}
+
+/// `allow CODE "reason"`: a finding that is known and accepted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Allow {
+    /// The finding's code.
+    pub code: Ident,
+    /// Why it is accepted.
+    pub reason: At<String>,
+    /// Whole statement.
+    pub at: Origin,
 }
 
 /// `use std.materials.rigur` or `use "finger.mech"`.
@@ -241,6 +254,8 @@ pub enum StatementKind {
         /// Points written in braces: it has none.
         points: Vec<Ident>,
     },
+    /// `allow CODE "reason"`
+    Allow(Allow),
     /// A statement of the target language that this version does not have yet: its keyword.
     Later {
         /// Keyword.

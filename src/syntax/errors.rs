@@ -24,7 +24,7 @@ use super::grammar::{Failure, Wanted, why};
 use super::lower::Lower;
 use super::tree::{Kind, Node};
 use super::words::{ITEM_WORDS, STATEMENT_WORDS, form, is_joint_kind, nearest};
-use crate::diagnostic::{Diagnostic, Origin};
+use crate::diagnostic::{Diagnostic, Edit, Fix, Origin};
 
 /// Broken parts that are looked into; looking costs as much as parsing them once more.
 const MAX_ERRORS: usize = 100;
@@ -203,11 +203,12 @@ impl Lower<'_> {
         let at = self.at(start, start + word.len());
         let diagnostic =
             Diagnostic::error("E0002", format!("no {what} starts with `{word}`"), at).label("not a keyword");
-        let help = match nearest(word, known) {
-            Some(near) => format!("did you mean `{near}`?"),
-            None => starts(what, known),
-        };
-        self.report(diagnostic.help(help));
+        self.report(match nearest(word, known) {
+            Some(near) => diagnostic
+                .help(format!("did you mean `{near}`?"))
+                .fix(Fix::risky(format!("write `{near}`"), vec![Edit::replace(at, near)])),
+            None => diagnostic.help(starts(what, known)),
+        });
     }
 
     /// E0001, E0010 or E0012: where a part stopped making sense, and what would have.

@@ -299,6 +299,7 @@ fn kind(rule: Rule) -> Kind {
         Rule::scaled => Kind::Scaled,
         Rule::merging => Kind::Merging,
         Rule::st_mirror => Kind::Mirror,
+        Rule::st_allow => Kind::Allow,
         Rule::sharing => Kind::Sharing,
         Rule::rod_axis => Kind::RodAxis,
         Rule::st_own => Kind::OwnBody,

@@ -78,6 +78,7 @@ impl<'a> Lower<'a> {
             match node.kind {
                 Kind::Edition => self.edition(node, &mut file),
                 Kind::Import => file.uses.extend(self.import(node)),
+                Kind::Allow => file.allows.extend(self.allow(node)),
                 Kind::Mechanism => file.items.extend(self.mechanism(node, doc)),
                 Kind::Flexure => file.items.extend(self.flexure(node, doc)),
                 Kind::Record => file.items.extend(self.record(node, doc)),

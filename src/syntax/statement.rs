@@ -1,7 +1,7 @@
 //! Statements: concrete tree to [`ast::StatementKind`].
 
 use super::ast::{
-    At, Cable, Compare, Expr, Ident, Joint, Load, Profile, Rod, RodEnd, Statement, StatementKind,
+    Allow, At, Cable, Compare, Expr, Ident, Joint, Load, Profile, Rod, RodEnd, Statement, StatementKind,
     TemplateUse, Term,
 };
 use super::lower::Lower;
@@ -82,6 +82,7 @@ impl Lower<'_> {
             },
             Kind::String => StatementKind::String(Box::new(self.string(node)?)),
             Kind::Load => StatementKind::Load(Box::new(self.load(node)?)),
+            Kind::Allow => StatementKind::Allow(self.allow(node)?),
             Kind::Later => StatementKind::Later { keyword: self.named(node.first(Kind::Keyword)?) },
             _ => return None,
         })
@@ -233,6 +234,12 @@ impl Lower<'_> {
         })
     }
 
+    pub(super) fn allow(&mut self, node: &Node) -> Option<Allow> {
+        let reason = node.first(Kind::Text)?;
+        let reason = At { node: self.quoted(reason), at: self.origin(reason) };
+        Some(Allow { code: self.ident(node)?, reason, at: self.origin(node) })
+    }
+
     fn rod(&mut self, node: &Node) -> Option<Rod> {
         let mut section = self.values(node.first(Kind::RodSection)?).into_iter();
         Some(Rod {
@@ -262,7 +269,9 @@ impl Lower<'_> {
         for statement in statements {
             let (fits, what) = match &statement.kind {
                 StatementKind::Param { .. } | StatementKind::Let { .. } => (true, ""),
-                StatementKind::Later { .. } | StatementKind::Broken { .. } => (true, ""),
+                StatementKind::Later { .. } | StatementKind::Allow(_) | StatementKind::Broken { .. } => {
+                    (true, "")
+                }
                 StatementKind::Rod(_) => (!mechanism, "a rod belongs in a `flexure`"),
                 StatementKind::OwnBody { .. } => (!mechanism, "a flexure's own body belongs in a `flexure`"),
                 _ => (mechanism, "this statement belongs in a `mechanism`"),

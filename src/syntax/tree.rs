@@ -89,6 +89,7 @@ pub enum Kind {
     Merging,
     Mirror,
     Sharing,
+    Allow,
     RodAxis,
     OwnBody,
     String,

@@ -2,7 +2,7 @@
 
 /// Words that start a top-level declaration.
 pub(super) const ITEM_WORDS: &[&str] =
-    &["edition", "use", "mechanism", "flexure", "material", "process", "motor"];
+    &["edition", "use", "mechanism", "flexure", "material", "process", "motor", "allow"];
 
 /// Words that start a statement inside a block.
 pub(super) const STATEMENT_WORDS: &[&str] = &[
@@ -107,6 +107,7 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "body" => "body NAME",
         "rod" => "rod NAME { from a at … along … to b at … along … section … }",
         "string" => "string NAME: BODY at POINT to BODY via POINT",
+        "allow" => "allow CODE \"REASON\"",
         "load" => "load FORCE along DIRECTION on BODY at POINT",
         _ => return None,
     })
