@@ -265,7 +265,9 @@ fn build_planned(
 /// Meaningless input, or a body without any point.
 pub fn plan_bodies(input: &PartsInput) -> Result<Vec<BodyPlan>, GeometryError> {
     validate(input)?;
-    (0..input.bodies.len()).map(|i| plan_body(input, i)).collect()
+    // Gathered before it is judged: the first body that fails is told, on any number of threads.
+    let plans: Vec<_> = (0..input.bodies.len()).into_par_iter().map(|i| plan_body(input, i)).collect();
+    plans.into_iter().collect()
 }
 
 /// Bodies joined by flexures, each group sorted, groups in the order of their first bodies.

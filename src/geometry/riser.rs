@@ -27,6 +27,10 @@ const DISTANCE_STEP_MM: f64 = 1.5;
 /// A straight way is given up only if something would really be hit, by this, mm: what it is compared with is not exact.
 const OVERLAP_MM: f64 = 0.2;
 
+/// What is farther than this beyond a bound needs no exact distance, mm: more than rounding and the stopping rule of
+/// the latter.
+const SURELY_MM: f64 = 1e-3;
+
 /// Something that moves beside a body, where it is in one state.
 pub(super) struct Near {
     slot: Slot,
@@ -50,7 +54,9 @@ impl Builder<'_> {
     fn nearer_than<'n>(&self, slot: &Slot, gap_mm: f64, near: impl IntoIterator<Item = &'n Near>) -> bool {
         let (center, radius) = slot.bounding_sphere();
         near.into_iter().any(|n| {
-            (n.center - center).norm() - n.radius - radius < gap_mm && nearer_than(&n.slot, slot, gap_mm)
+            (n.center - center).norm() - n.radius - radius < gap_mm
+                && slot.signed_distance(&n.center) - n.radius < gap_mm + SURELY_MM
+                && nearer_than(&n.slot, slot, gap_mm)
         })
     }
 
@@ -59,50 +65,54 @@ impl Builder<'_> {
         self.moving.get_or_init(|| {
             let still = vec![vec![Pose::rest(Vector3::zeros()); self.input.bodies.len()]];
             let states = if self.input.motion.is_empty() { &still } else { &self.input.motion };
+            let straight: Vec<Vec<Slot>> = self.input.flexures.iter().map(FlexureSolid::slots).collect();
+            let others: Vec<(usize, Vec<Slot>)> = (self.input.bodies.iter().enumerate())
+                .filter(|(b, _)| *b != self.index)
+                .map(|(b, body)| (b, self.rough(b, body)))
+                .collect();
             let mut near = Vec::new();
             for poses in states {
                 let Some(own) = poses.get(self.index) else { continue };
                 let seen: Vec<Pose> = poses.iter().map(|p| from(own, p)).collect();
-                for flexure in &self.input.flexures {
-                    near.extend(self.bent(flexure, &seen).into_iter().map(Near::new));
+                for (flexure, slots) in self.input.flexures.iter().zip(&straight) {
+                    near.extend(self.bent(flexure, slots, &seen).map(Near::new));
                 }
-                let others =
-                    self.input.bodies.iter().zip(&seen).enumerate().filter(|(b, _)| *b != self.index);
-                for (b, (body, pose)) in others {
-                    near.extend(self.rough(b, body).iter().map(|s| Near::new(s.moved(pose))));
+                for (b, slots) in &others {
+                    near.extend(slots.iter().map(|s| Near::new(s.moved(&seen[*b]))));
                 }
             }
             near
         })
     }
 
-    /// A flexure as the motion of its two bodies bends it, about: near each end it follows the body there.
-    fn bent(&self, flexure: &FlexureSolid, seen: &[Pose]) -> Vec<Slot> {
-        let (Some(a), Some(b)) = (seen.get(flexure.bodies.0), seen.get(flexure.bodies.1)) else {
-            return Vec::new();
-        };
-        let slots = flexure.slots();
+    /// A flexure, as `slots` at rest, as the motion of its two bodies bends it, about: near each end it follows the
+    /// body there.
+    fn bent<'s>(
+        &'s self,
+        flexure: &'s FlexureSolid,
+        slots: &'s [Slot],
+        seen: &'s [Pose],
+    ) -> impl Iterator<Item = Slot> + 's {
+        let bodies = seen.get(flexure.bodies.0).zip(seen.get(flexure.bodies.1));
         let count = slots.len().max(1) as f64;
         let ends = [(flexure.bodies.0, false), (flexure.bodies.1, true)];
-        let root = |p: &Vector3<f64>| {
-            let own = ends.iter().filter(|(body, _)| *body == self.index);
-            own.clone().any(|(_, at_end)| (flexure.end_point(*at_end) - p).norm() < ROOT_MM)
+        let root = move |p: &Vector3<f64>| {
+            let mut own = ends.iter().filter(|(body, _)| *body == self.index);
+            own.any(|(_, at_end)| (flexure.end_point(*at_end) - p).norm() < ROOT_MM)
         };
-        let place = |p: &Vector3<f64>, u: f64| {
-            let w = u * u * (3.0 - 2.0 * u);
-            a.point(p).lerp(&b.point(p), w)
-        };
-        slots
-            .iter()
-            .enumerate()
-            .filter(|(_, s)| !root(&s.start) && !root(&s.end))
-            .map(|(i, s)| {
+        bodies.into_iter().flat_map(move |(a, b)| {
+            let place = move |p: &Vector3<f64>, u: f64| {
+                let w = u * u * (3.0 - 2.0 * u);
+                a.point(p).lerp(&b.point(p), w)
+            };
+            let free = slots.iter().enumerate().filter(move |(_, s)| !root(&s.start) && !root(&s.end));
+            free.map(move |(i, s)| {
                 let (u, v) = (i as f64 / count, (i + 1) as f64 / count);
                 let axis = a.direction(&s.axis).lerp(&b.direction(&s.axis), u);
                 let axis = axis.try_normalize(1e-9).unwrap_or(s.axis);
                 Slot { start: place(&s.start, u), end: place(&s.end, v), axis, ..*s }
             })
-            .collect()
+        })
     }
 
     /// Another body before it is planned: its eyes, the bars between those in its own layer, its sleeves and stubs.

@@ -8,7 +8,9 @@
 //! | flexure, link | unless the flexure is attached to it: the link is carved instead |
 //! | flexure, flexure | of different joints; of one joint only where they overlap, away from their ends |
 
+mod extent;
 mod kernel;
+mod placed;
 mod strip;
 
 use super::{Objective, StateView, StatesSensitivity};
@@ -16,8 +18,9 @@ use crate::geometry::link::Role;
 use crate::ir::{Design, Section};
 use crate::optimize::Normal;
 use nalgebra::{DMatrix, DVector};
+use placed::Placed;
 use std::sync::OnceLock;
-use strip::{Strip, StripGradient, fineness, link_jacobian, link_strip, rod_jacobian, rod_strips, strips};
+use strip::{StripGradient, fineness, link_jacobian, link_strip, rod_jacobian, rod_strips};
 
 /// 1 mm² in m².
 const SQUARE_METRE: f64 = 1e-6;
@@ -72,54 +75,56 @@ impl Collision {
     fn for_each_pair(&self, view: &StateView, mut f: impl FnMut([Source; 2], f64, &[StripGradient; 2])) {
         let (model, poses) = (view.model, &view.equilibrium.state.poses);
         let first = self.fineness.get_or_init(|| view.capsules.iter().map(fineness).collect());
-        let links: Vec<Strip> = view
-            .capsules
-            .iter()
-            .enumerate()
-            .map(|(i, c)| {
-                let same = first.get(i).filter(|_| first.len() == view.capsules.len());
-                link_strip(c, &poses[c.body], same.copied().unwrap_or_else(|| fineness(c)))
-            })
-            .collect();
-        let rods: Vec<Vec<Strip>> = model
+        let links = view.capsules.iter().enumerate().map(|(i, c)| {
+            let same = first.get(i).filter(|_| first.len() == view.capsules.len());
+            link_strip(c, &poses[c.body], same.copied().unwrap_or_else(|| fineness(c)))
+        });
+        let links = Placed::new(links.collect(), |i, j| view.capsules[i].body == view.capsules[j].body);
+        let rods: Vec<Placed> = model
             .rods
             .iter()
             .zip(&view.equilibrium.state.rods)
             .zip(&self.copies)
-            .map(|((rod, state), copies)| rod_strips(state, &rod.rod, *copies))
+            .map(|((rod, state), copies)| Placed::new(rod_strips(state, &rod.rod, *copies), |_, _| true))
             .collect();
-        let mut compare = |a: (Source, &Strip), b: (Source, &Strip), gap: f64| {
-            if let Some((value, by)) = strips(a.1, b.1, gap) {
-                f([a.0, b.0], value, &by);
-            }
-        };
-        for (i, first) in links.iter().enumerate() {
-            for (j, second) in links.iter().enumerate().skip(i + 1) {
-                let (a, b) = (&view.capsules[i], &view.capsules[j]);
-                let held = matches!((a.role, b.role), (Role::Eye(p), Role::Eye(q)) if p == q);
-                if a.body != b.body && !held {
-                    compare((Source::Link(i), first), (Source::Link(j), second), self.gap_mm);
-                }
-            }
+        let body = |i: usize| view.capsules[i].body;
+        for i in 0..view.capsules.len() {
+            links.near(links.one(i), i + 1, self.gap_mm, |j, value, by| {
+                f([Source::Link(i), Source::Link(j)], value, by);
+            }, |j| {
+                let held = matches!((view.capsules[i].role, view.capsules[j].role), (Role::Eye(p), Role::Eye(q)) if p == q);
+                body(i) != body(j) && !held
+            });
         }
         for (r, edges) in rods.iter().enumerate() {
             let own = model.rods[r].bodies;
-            for (e, edge) in edges.iter().enumerate() {
-                for (j, link) in links.iter().enumerate() {
-                    if !own.contains(&view.capsules[j].body) {
-                        compare((Source::Rod(r, e), edge), (Source::Link(j), link), self.gap_mm);
-                    }
-                }
+            for e in 0..edges.len() {
+                links.near(
+                    edges.one(e),
+                    0,
+                    self.gap_mm,
+                    |j, value, by| {
+                        f([Source::Rod(r, e), Source::Link(j)], value, by);
+                    },
+                    |j| !own.contains(&body(j)),
+                );
             }
             for (s, others) in rods.iter().enumerate().skip(r + 1) {
                 let same = self.joints[r] == self.joints[s];
                 let gap = if same { 0.0 } else { self.gap_mm };
-                for (e, edge) in edges.iter().enumerate().filter(|(e, _)| !same || inner(*e, edges.len())) {
-                    for (k, other) in
-                        others.iter().enumerate().filter(|(k, _)| !same || inner(*k, others.len()))
-                    {
-                        compare((Source::Rod(r, e), edge), (Source::Rod(s, k), other), gap);
-                    }
+                if edges.far(others, gap) {
+                    continue;
+                }
+                for e in (0..edges.len()).filter(|e| !same || inner(*e, edges.len())) {
+                    others.near(
+                        edges.one(e),
+                        0,
+                        gap,
+                        |k, value, by| {
+                            f([Source::Rod(r, e), Source::Rod(s, k)], value, by);
+                        },
+                        |k| !same || inner(k, others.len()),
+                    );
                 }
             }
         }

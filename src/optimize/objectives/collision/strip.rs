@@ -1,6 +1,7 @@
 //! What the term measures distances of: strips. A strip is a fan of capsules side by side: a piece of a flexure (an
 //! edge of its rod) or of a link (a slot of its skeleton), in world coordinates at a state.
 
+use super::extent::{Extent, Window};
 use super::kernel::{GAUSS_3, near};
 use crate::equilibrium::{Model, Sensitivity};
 use crate::geometry::SkeletonCapsule;
@@ -72,7 +73,7 @@ impl Strip {
     }
 
     /// Position of capsule number k in the fan, −1..1.
-    fn place(&self, k: usize) -> f64 {
+    pub fn place(&self, k: usize) -> f64 {
         if self.copies < 2 { 0.0 } else { 2.0 * k as f64 / (self.copies - 1) as f64 - 1.0 }
     }
 
@@ -84,42 +85,37 @@ impl Strip {
             rule.map(|(x, w)| ((k as f64 + 0.5 * (1.0 + x)) / panels as f64, w / panels as f64))
         })
     }
-
-    /// Whether no two points of the strips' axes can be as near as `reach`.
-    pub fn far(&self, other: &Self, reach: f64) -> bool {
-        let half = |s: &Self, c: usize| 0.5 * (s.ends[1][c] - s.ends[0][c]).abs() + s.fan[c].abs() * s.spread;
-        let middle = |s: &Self, c: usize| 0.5 * (s.ends[0][c] + s.ends[1][c]);
-        (0..3).any(|c| (middle(self, c) - middle(other, c)).abs() >= half(self, c) + half(other, c) + reach)
-    }
-}
-
-/// Distance of a point from a segment, squared.
-fn square_distance(x: &Vector3<f64>, ends: &[Vector3<f64>; 2]) -> f64 {
-    let e = ends[1] - ends[0];
-    let s = ((x - ends[0]).dot(&e) / e.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-    (ends[0] + e * s - x).norm_squared()
 }
 
 /// The penalty of two strips: the mean over both fans of the double integral over both lengths, mm², with its
 /// derivatives; none if it is zero.
-pub fn strips(a: &Strip, b: &Strip, gap_mm: f64) -> Option<(f64, [StripGradient; 2])> {
+pub fn strips(
+    (a, at): (&Strip, &Extent),
+    (b, bt): (&Strip, &Extent),
+    gap_mm: f64,
+) -> Option<(f64, [StripGradient; 2])> {
     let reach = a.radius + b.radius + gap_mm;
-    if a.far(b, reach) {
+    if at.bounds.far(&bt.bounds, reach) || at.apart(bt, reach) {
         return None;
     }
     let mut mean = 0.0;
     let mut by = [StripGradient::default(); 2];
     let share = 1.0 / (a.copies * b.copies) as f64;
-    let bound = (reach + a.spread + b.spread).powi(2);
+    let window = Window::new(at, b, bt, reach);
     for (s, weight) in a.samples() {
         let on_axis = a.ends[0] * (1.0 - s) + a.ends[1] * s;
-        if square_distance(&on_axis, &b.ends) >= bound {
+        let seen = window.see(&on_axis);
+        if window.misses(&seen) {
             continue;
         }
         for i in 0..a.copies {
             let xi = a.place(i);
+            let copies = window.copies(&seen, xi);
+            if copies.is_empty() {
+                continue;
+            }
             let x = on_axis + a.fan * (a.spread * xi);
-            for k in 0..b.copies {
+            for k in copies {
                 let eta = b.place(k);
                 let offset = b.fan * (b.spread * eta);
                 let ends = [b.ends[0] + offset, b.ends[1] + offset];
