@@ -5,6 +5,7 @@ mod aims;
 mod assembly;
 mod compiler;
 mod joined;
+mod lay;
 mod manifest;
 mod measure;
 mod products;
