@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 /// Most steps of a cycle.
 const MAX_STEPS: f64 = 100_000.0;
-const EXPORTS: &[&str] = &["stl", "glb", "arduino"];
+const EXPORTS: &[&str] = &["stl", "3mf", "sheet", "glb", "svg", "png", "arduino"];
 const LATER_EXPORTS: &[&str] = &["report", "dynamixel", "micropython", "csv", "step"];
 
 impl<'a> Evaluator<'a> {
@@ -118,9 +118,16 @@ impl<'a> Evaluator<'a> {
                 };
                 Ok(Export { kind, origin: e.at })
             }
-            "glb" => {
+            plain @ ("glb" | "3mf" | "sheet" | "svg" | "png") => {
                 self.arguments(name, args, &[], 0)?;
-                Ok(Export { kind: ExportKind::Glb, origin: e.at })
+                let kind = match plain {
+                    "glb" => ExportKind::Glb,
+                    "3mf" => ExportKind::ThreeMf,
+                    "sheet" => ExportKind::Sheet,
+                    "svg" => ExportKind::Svg,
+                    _ => ExportKind::Png,
+                };
+                Ok(Export { kind, origin: e.at })
             }
             "arduino" => {
                 let slots = self.arguments(name, args, &["drive"], 1)?;

@@ -8,7 +8,7 @@ use super::scope::{Key, State};
 use super::units::GRAMS_PER_TONNE;
 use super::value::{ItemRef, Value};
 use crate::diagnostic::{Diagnostic, Origin};
-use crate::ir::{Material, Motor, MotorInterface, Process};
+use crate::ir::{Machine, Material, Motor, MotorInterface, Process};
 use crate::syntax::ast::{Ident, Item, Record};
 
 /// What a field holds.
@@ -38,8 +38,16 @@ const MATERIAL: &[Field] = &[
     field("strain_repeated", Dimension::NUMBER, false),
 ];
 
-const PROCESS: &[Field] =
-    &[field("least_wall", Dimension::LENGTH, true), field("clearance", Dimension::LENGTH, true)];
+const PROCESS: &[Field] = &[
+    field("least_wall", Dimension::LENGTH, true),
+    field("clearance", Dimension::LENGTH, true),
+    field("layer", Dimension::LENGTH, false),
+    field("line", Dimension::LENGTH, false),
+    field("across", Dimension::NUMBER, false),
+    field("bed_width", Dimension::LENGTH, false),
+    field("bed_depth", Dimension::LENGTH, false),
+    field("bed_height", Dimension::LENGTH, false),
+];
 
 const MOTOR: &[Field] = &[
     Field { name: "interface", holds: Holds::Text, required: true },
@@ -262,10 +270,32 @@ impl<'a> Evaluator<'a> {
 
     pub(super) fn process(&mut self, item: ItemRef) -> Outcome<Process> {
         let record = self.check_record(item)?;
+        let bed = ["bed_width", "bed_depth", "bed_height"].map(|side| self.positive_field(item, side));
+        let bed_mm = match bed {
+            [Ok(Some(x)), Ok(Some(y)), Ok(Some(z))] => Some([x, y, z]),
+            [Ok(None), Ok(None), Ok(None)] => None,
+            sides => {
+                if sides.iter().all(Result::is_ok) {
+                    let message = format!("process `{}` states a bed in part", record.name.node);
+                    self.out.push(
+                        Diagnostic::error(codes::RECORD, message, record.name.at)
+                            .help("state `bed_width`, `bed_depth` and `bed_height`, or none of them"),
+                    );
+                }
+                return Err(super::eval::Failed);
+            }
+        };
+        let machine = Machine {
+            layer_mm: self.positive_field(item, "layer")?,
+            line_mm: self.positive_field(item, "line")?,
+            across: self.positive_field(item, "across")?,
+            bed_mm,
+        };
         Ok(Process {
             name: record.name.node.clone(),
             least_wall_mm: self.positive_field(item, "least_wall")?.unwrap_or_default(),
             clearance_mm: self.positive_field(item, "clearance")?.unwrap_or_default(),
+            machine,
         })
     }
 

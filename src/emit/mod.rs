@@ -2,8 +2,13 @@
 
 pub mod arduino;
 pub mod csv;
+pub mod drawing;
 pub mod glb;
 pub mod lock;
 mod normals;
+pub mod picture;
+pub mod plate;
 pub mod scene;
+pub mod sheet;
 pub mod stl;
+pub mod threemf;

@@ -29,6 +29,45 @@ pub struct Scene {
     pub ghosts: Vec<Ghost>,
     /// Traced points.
     pub traces: Vec<Trace>,
+    /// The common axis of all joints, where there is one.
+    pub flat: Option<Vector3<f64>>,
+    /// Bodies as bars, at rest.
+    pub outlines: Vec<Outline>,
+    /// Joints, at rest.
+    pub marks: Vec<Mark>,
+}
+
+/// A body as it is drawn: the bars of its solid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    /// Name of the body.
+    pub name: String,
+    /// It stands still.
+    pub ground: bool,
+    /// In the rest pose.
+    pub bars: Vec<Bar>,
+}
+
+/// A bar between two places, mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bar {
+    /// Its ends.
+    pub ends: [Vector3<f64>; 2],
+    /// Half its width.
+    pub radius_mm: f64,
+}
+
+/// A joint as it is drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mark {
+    /// Name.
+    pub name: String,
+    /// Where it is in the rest pose, mm.
+    pub at: Vector3<f64>,
+    /// Made of flexures.
+    pub flexible: bool,
+    /// Diameter of its bore, mm.
+    pub bore_mm: Option<f64>,
 }
 
 /// A place with axes: x = origin + rotation · X.

@@ -33,6 +33,20 @@ impl Mesh {
     }
 }
 
+impl FlexureSolid {
+    /// The flexure in another place; its indices stay those of its design.
+    pub fn placed(&self, placement: &Placement) -> FlexureSolid {
+        FlexureSolid {
+            joint_point: placement.point(&self.joint_point),
+            centreline: self.centreline.iter().map(|x| placement.point(x)).collect(),
+            // In a mirror image m1 × m2 would point against the tangent; sections are symmetric.
+            m1: self.m1.iter().map(|m| placement.direction(m) * placement.handedness()).collect(),
+            m2: self.m2.iter().map(|m| placement.direction(m)).collect(),
+            ..self.clone()
+        }
+    }
+}
+
 impl Slot {
     /// The slot in another place.
     pub fn placed(&self, placement: &Placement) -> Slot {
@@ -244,17 +258,11 @@ impl Placed<'_> {
     }
 
     fn flexure(&self, f: &FlexureSolid) -> FlexureSolid {
-        let p = &self.share.placement;
         let body = |b: usize| self.share.bodies.get(b).copied().unwrap_or(usize::MAX);
         FlexureSolid {
             joint: f.joint + self.joint,
-            joint_point: p.point(&f.joint_point),
             bodies: (body(f.bodies.0), body(f.bodies.1)),
-            centreline: f.centreline.iter().map(|x| p.point(x)).collect(),
-            // In a mirror image m1 × m2 would point against the tangent; sections are symmetric.
-            m1: f.m1.iter().map(|m| p.direction(m) * p.handedness()).collect(),
-            m2: f.m2.iter().map(|m| p.direction(m)).collect(),
-            ..f.clone()
+            ..f.placed(&self.share.placement)
         }
     }
 

@@ -15,6 +15,7 @@
 //! | `mesh`, `check`, `exact`, `ray` | triangle meshes, their facts by exact arithmetic, measurements on them |
 //! | `weigh` | what links weigh, before anything is meshed |
 //! | `joined` | parts of several instances |
+//! | `lie` | how a part lies on the bed |
 //! | `distance`, `gap`, `cycle` | least distances, overlaps in the rest pose, gaps over a cycle |
 
 pub mod anchor;
@@ -30,6 +31,7 @@ mod guide;
 pub mod input;
 pub mod joined;
 mod layers;
+pub mod lie;
 pub mod link;
 pub mod mesh;
 pub mod parts;
@@ -54,6 +56,7 @@ pub use check::{MeshFacts, check_mesh};
 pub use cycle::{CycleGaps, LeastGap, MovedState, carved_cycle_gaps, cycle_gaps};
 pub use gap::{Fusion, Member};
 pub use input::{flexure_solid, parts_input};
+pub use lie::{Lying, Posture, lie};
 pub use mesh::Mesh;
 pub use parts::{
     BodySolid, Bore, Eye, FlexureSolid, GeometryError, Guide, Part, Parts, PartsInput, build_carved_parts,

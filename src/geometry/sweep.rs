@@ -179,6 +179,11 @@ impl FlexureSolid {
     }
 }
 
+/// Unit tangents at the stations.
+pub(super) fn tangents(flexure: &FlexureSolid) -> Vec<Vector3<f64>> {
+    flexure.m1.iter().zip(&flexure.m2).map(|(m1, m2)| m1.cross(m2)).collect()
+}
+
 /// Section at u in 0..1 between two stations: cubic Hermite centre, frame interpolated and made
 /// orthonormal again.
 fn between(p: &Station, q: &Station, tp: &Vector3<f64>, tq: &Vector3<f64>, u: f64) -> Station {

@@ -560,6 +560,22 @@ pub struct Process {
     pub least_wall_mm: f64,
     /// Least clearance between moving parts, mm.
     pub clearance_mm: f64,
+    /// How a part is put on the machine: of no influence on the design.
+    #[serde(default)]
+    pub machine: Machine,
+}
+
+/// What a process says of its machine, where it is stated.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Machine {
+    /// Height of a printed layer, mm.
+    pub layer_mm: Option<f64>,
+    /// Width of an extruded line, mm.
+    pub line_mm: Option<f64>,
+    /// Strength across the layers relative to that within them.
+    pub across: Option<f64>,
+    /// Room for parts: width, depth, height, mm.
+    pub bed_mm: Option<[f64; 3]>,
 }
 
 /// Stacking of planar links along their common axis.
@@ -628,6 +644,14 @@ pub enum ExportKind {
     StlAssembled,
     /// One binary glTF of the whole, moving.
     Glb,
+    /// One 3MF with all parts on the bed.
+    ThreeMf,
+    /// A print sheet.
+    Sheet,
+    /// A picture of the rest pose.
+    Png,
+    /// A drawing of the rest pose.
+    Svg,
     /// Arduino sketch for one drive. Index into [`Design::drives`].
     Arduino(usize),
 }

@@ -7,6 +7,7 @@ mod compiler;
 mod examine;
 mod gravity;
 mod joined;
+mod lay;
 mod manifest;
 mod measure;
 mod products;

@@ -1,13 +1,24 @@
 //! Files of the printed parts and of what they do, as the exports ask for them.
 
 use super::joined::{Printed, Solid};
+use super::lay;
 use super::report::Artefact;
 use super::scene::{Moving, scene};
 use crate::diagnostic::Diagnostic;
+use crate::emit::drawing::svg_drawing;
 use crate::emit::glb::glb_bytes;
+use crate::emit::picture::png_bytes;
+use crate::emit::plate::Plate;
+use crate::emit::scene::Scene;
+use crate::emit::sheet::print_sheet;
 use crate::emit::stl::stl_bytes;
+use crate::emit::threemf::threemf_bytes;
 use crate::ir::{Assembly, ExportKind};
 use std::cell::OnceCell;
+
+/// Pixels of a picture, and of the thumbnail in an archive of parts.
+const PICTURE: (u32, u32) = (960, 720);
+const THUMBNAIL: (u32, u32) = (320, 240);
 
 /// A built assembly: designs in solids and in motion, and its parts.
 pub struct Built<'a> {
@@ -21,35 +32,75 @@ pub struct Built<'a> {
     pub printed: &'a [Printed],
 }
 
-/// Every export of parts that is asked for, in the order of the text, each kind once; and what could not be written.
+/// A file, or why there is none with the code of that finding and what it should have been.
+type Written = Result<Artefact, (&'static str, &'static str, String)>;
+
+/// Every export of parts that is asked for, in the order of the text, each kind once; and what is to say of them.
 pub fn artefacts(built: &Built<'_>) -> (Vec<Artefact>, Vec<Diagnostic>) {
+    let Built { assembly, solids, moving, printed } = *built;
+    let (shown, laid) = (OnceCell::new(), OnceCell::new());
+    let scene = || shown.get_or_init(|| scene(assembly, moving, solids, printed));
+    let plate = || laid.get_or_init(|| lay::plate(assembly, moving, printed));
     let (mut out, mut found) = (Vec::new(), Vec::new());
-    let name = &built.assembly.name;
-    let shown = OnceCell::new();
-    let scene = || shown.get_or_init(|| scene(built.assembly, built.moving, built.solids, built.printed));
-    for (k, placed) in built.assembly.exports.iter().enumerate() {
-        let (kind, at) = (&placed.export.kind, placed.export.origin);
-        if built.assembly.exports.iter().take(k).any(|e| e.export.kind == *kind) {
+    for (k, placed) in assembly.exports.iter().enumerate() {
+        let kind = &placed.export.kind;
+        if assembly.exports.iter().take(k).any(|e| e.export.kind == *kind) {
             continue;
         }
-        let mut keep = |name: String, bytes: Result<Vec<u8>, String>, (code, what): (&str, &str)| match bytes
-        {
-            Ok(bytes) => out.push(Artefact { name, bytes }),
-            Err(e) => found.push(Diagnostic::error(code, format!("no {what} can be written: {e}"), at)),
-        };
-        match kind {
-            ExportKind::Stl | ExportKind::StlAssembled => {
-                for part in built.printed {
-                    let bytes = stl_bytes(&part.mesh).map_err(|e| e.to_string());
-                    keep(format!("{}.stl", part.name), bytes, ("E0631", "STL"));
+        for written in files(&assembly.name, kind, printed, &scene, &plate) {
+            match written {
+                Ok(artefact) => out.push(artefact),
+                Err((code, what, why)) => {
+                    let message = format!("no {what} can be written: {why}");
+                    found.push(
+                        Diagnostic::error(code, message, placed.export.origin)
+                            .help("build without this export, and report what was said"),
+                    );
                 }
             }
-            ExportKind::Glb => {
-                let bytes = glb_bytes(scene()).map_err(|e| e.to_string());
-                keep(format!("{name}.glb"), bytes, ("E0643", "glTF"));
-            }
-            ExportKind::Arduino(_) => {}
         }
     }
+    if let Some(plate) = laid.get() {
+        found.extend(lay::findings(assembly, plate, printed));
+    }
     (out, found)
+}
+
+fn files<'s>(
+    name: &str,
+    kind: &ExportKind,
+    printed: &[Printed],
+    scene: &dyn Fn() -> &'s Scene,
+    plate: &dyn Fn() -> &'s Plate,
+) -> Vec<Written> {
+    let file = |name: String, bytes: Result<Vec<u8>, String>, code: &'static str, what: &'static str| {
+        bytes.map(|bytes| Artefact { name, bytes }).map_err(|why| (code, what, why))
+    };
+    let stl =
+        |name: &str, mesh| file(name.to_string(), stl_bytes(mesh).map_err(|e| e.to_string()), "E0631", "STL");
+    let picture = |(width, height)| png_bytes(scene(), width, height);
+    match kind {
+        ExportKind::Stl => plate().parts.iter().map(|p| stl(&format!("{}.stl", p.name), &p.mesh)).collect(),
+        ExportKind::StlAssembled => {
+            printed.iter().map(|p| stl(&format!("{}.assembled.stl", p.name), &p.mesh)).collect()
+        }
+        ExportKind::Glb => {
+            let bytes = glb_bytes(scene()).map_err(|e| e.to_string());
+            vec![file(format!("{name}.glb"), bytes, "E0643", "glTF")]
+        }
+        ExportKind::ThreeMf => {
+            let bytes = picture(THUMBNAIL).and_then(|thumbnail| threemf_bytes(plate(), &thumbnail));
+            vec![file(format!("{name}.3mf"), bytes, "E0646", "3MF")]
+        }
+        ExportKind::Sheet => {
+            let bytes = Ok(print_sheet(plate()).into_bytes());
+            vec![file(format!("{name}.print.md"), bytes, "E0646", "print sheet")]
+        }
+        ExportKind::Png => vec![file(format!("{name}.png"), picture(PICTURE), "E0647", "picture")],
+        ExportKind::Svg => {
+            let bytes = Ok(svg_drawing(scene()).into_bytes());
+            vec![file(format!("{name}.svg"), bytes, "E0647", "drawing")]
+        }
+        ExportKind::Arduino(_) => Vec::new(),
+    }
 }

@@ -1,7 +1,7 @@
 //! From solved designs and their printed parts to the [`Scene`] that viewers show: every instance in its place.
 
 use super::joined::{Printed, Solid};
-use crate::emit::scene::{Frame, Ghost, Link, Ribbon, Scene, Trace};
+use crate::emit::scene::{Bar, Frame, Ghost, Link, Mark, Outline, Ribbon, Scene, Trace};
 use crate::equilibrium::{Cycle, Layout, Model};
 use crate::geometry::skeleton::spanning_tree;
 use crate::geometry::{FlexureSolid, parts_input};
@@ -28,7 +28,7 @@ pub struct Moving {
     /// Pose of each body by state.
     poses: Vec<Vec<Pose>>,
     /// Flexures in the rest pose, with as many stations as in the states.
-    rest: Vec<FlexureSolid>,
+    pub rest: Vec<FlexureSolid>,
     /// Largest stress over the cycle by flexure, station and point.
     peaks_mpa: Vec<Vec<[f64; SECTION_POINTS]>>,
     /// Largest stress by flexure, state and station.
@@ -38,6 +38,9 @@ pub struct Moving {
     ghost_radius_mm: f64,
     conventional: Vec<Vec<Pose>>,
     traces: Vec<Trace>,
+    /// The common axis of all joints.
+    flat: Option<Vector3<f64>>,
+    marks: Vec<Mark>,
 }
 
 impl Moving {
@@ -78,7 +81,20 @@ impl Moving {
             path: cycle.states.iter().map(|e| e.state.poses[t.body].point(&t.rest)).collect(),
             target: if t.has_target { t.curve.clone() } else { Vec::new() },
         });
+        let bores = input.bodies.iter().flat_map(|b| &b.eyes);
+        let bores: Vec<(usize, Option<f64>)> = bores.map(|e| (e.joint, e.bore.diameter_mm())).collect();
+        let mark = |(j, joint): (usize, &crate::ir::Joint)| {
+            let body = joint.bodies.first().copied().unwrap_or_default();
+            Mark {
+                name: joint.name.clone(),
+                at: layout.rest_poses[body].point(&layout.joint_points[j]),
+                flexible: joint.is_compliant(),
+                bore_mm: bores.iter().filter(|b| b.0 == j).filter_map(|b| b.1).reduce(f64::max),
+            }
+        };
         Self {
+            marks: design.joints.iter().enumerate().map(mark).collect(),
+            flat: flat.then_some(axis),
             names: design.bodies.iter().map(|b| b.name.clone()).collect(),
             centers: layout.bodies.iter().map(|b| b.center).collect(),
             poses: cycle.states.iter().map(|e| e.state.poses.clone()).collect(),
@@ -146,9 +162,31 @@ pub fn scene(assembly: &Assembly, moving: &[Moving], solids: &[Solid], printed: 
             out.ribbons.extend(ribbon(instance, m, solid, *f).map(|r| Ribbon { part, ..r }));
         }
     }
+    out.flat = flat(assembly, moving);
     for (i, instance) in assembly.instances.iter().enumerate() {
         let Some((_, m)) = of(i) else { continue };
         let p = &instance.placement;
+        out.marks.extend(m.marks.iter().map(|mark| Mark {
+            name: instance.of(&mark.name),
+            at: p.point(&mark.at),
+            ..mark.clone()
+        }));
+        let plans = solids.get(instance.design).map_or(&[][..], |s| s.parts.plans.as_slice());
+        let bodies = assembly.designs.get(instance.design).map_or(&[][..], |d| d.bodies.as_slice());
+        out.outlines.extend(bodies.iter().zip(plans).map(|(body, plan)| {
+            Outline {
+                name: instance.of(&body.name),
+                ground: body.ground,
+                bars: plan
+                    .slots
+                    .iter()
+                    .map(|(_, s)| Bar {
+                        ends: [p.point(&s.start), p.point(&s.end)],
+                        radius_mm: s.disc_radius_mm + s.round_mm,
+                    })
+                    .collect(),
+            }
+        }));
         out.ghosts.extend(m.ghosts.iter().map(|(b, bars)| Ghost {
             name: m.names.get(*b).map(|n| instance.of(n)).unwrap_or_default(),
             bars: bars.iter().map(|bar| bar.map(|x| p.point(&x))).collect(),
@@ -163,6 +201,15 @@ pub fn scene(assembly: &Assembly, moving: &[Moving], solids: &[Solid], printed: 
         }));
     }
     out
+}
+
+/// The axis that all joints of all instances have in common.
+fn flat(assembly: &Assembly, moving: &[Moving]) -> Option<Vector3<f64>> {
+    let axis = |i: &Instance| Some(i.placement.direction(&moving.get(i.design)?.flat?));
+    let axes: Option<Vec<Vector3<f64>>> = assembly.instances.iter().map(axis).collect();
+    let axes = axes?;
+    let first = *axes.first()?;
+    axes.iter().all(|a| a.cross(&first).norm() < PARALLEL).then_some(first)
 }
 
 /// The least strength that a material states, else the largest stress.

@@ -130,8 +130,8 @@ impl Lock {
     }
 }
 
-/// Digest of all of a design that can change what is solved: not of comments, places, exports or
-/// requirements. Stable under the order in which fields are declared.
+/// Digest of all of a design that can change what is solved: not of comments, places, exports,
+/// requirements or the printer. Stable under the order in which fields are declared.
 pub fn design_digest(design: &Design) -> String {
     let mut value = match serde_json::to_value(design) {
         Ok(value) => value,
@@ -141,6 +141,9 @@ pub fn design_digest(design: &Design) -> String {
     if let Value::Object(fields) = &mut value {
         fields.remove("exports");
         fields.remove("requirements");
+        if let Some(Value::Object(process)) = fields.get_mut("process") {
+            process.remove("machine");
+        }
         // Angles are only looked at.
         if let Some(Value::Object(aims)) = fields.get_mut("aims") {
             aims.remove("angles");

@@ -1,0 +1,135 @@
+//! The print sheet, in Markdown: what goes onto the machine, how it lies there, and why.
+
+use super::plate::{Laid, Leaf, Plate};
+use crate::geometry::Posture;
+use std::fmt::Write;
+
+/// Thicknesses nearer to a whole number of lines than this part of a line count as whole.
+const WHOLE: f64 = 0.05;
+
+/// The text of the sheet: same plate, same text.
+pub fn print_sheet(plate: &Plate) -> String {
+    let mut out = format!("# Print sheet: {}\n\n", plate.name);
+    let mut told: Vec<(&str, &str)> = Vec::new();
+    for part in &plate.parts {
+        let key = (part.process.name.as_str(), part.material.name.as_str());
+        if !told.contains(&key) {
+            told.push(key);
+            process(&mut out, part);
+        }
+    }
+    out.push_str("| part | size on the bed, mm | volume, cm³ | mass, g | fits the bed |\n| --- | --- | --- | --- | --- |\n");
+    for part in &plate.parts {
+        let size = part.lying.size_mm;
+        let mass = part.mass_g().map_or("density not stated".into(), |m| format!("{m:.1}"));
+        let fits = match part.fits() {
+            Some(true) => "yes",
+            Some(false) => "**no**",
+            None => "bed not stated",
+        };
+        let volume = part.mesh.volume_mm3() / 1000.0;
+        let _ = writeln!(
+            out,
+            "| {} | {:.1} × {:.1} × {:.1} | {volume:.2} | {mass} | {fits} |",
+            part.name, size.x, size.y, size.z
+        );
+    }
+    let [wide, deep] = plate.room_mm();
+    if plate.parts.len() > 1 {
+        let _ = writeln!(out, "\nSide by side they take {wide:.0} × {deep:.0} mm.");
+    }
+    for part in &plate.parts {
+        lies(&mut out, part);
+    }
+    out
+}
+
+fn process(out: &mut String, part: &Laid) {
+    let (p, m) = (&part.process, &part.material);
+    let _ = writeln!(out, "`{}` in `{}`:\n", p.name, m.name);
+    let mut line = |what: &str, value: Option<String>| {
+        if let Some(value) = value {
+            let _ = writeln!(out, "- {what}: {value}");
+        }
+    };
+    line("layers", p.machine.layer_mm.map(|x| format!("{x} mm")));
+    line("lines", p.machine.line_mm.map(|x| format!("{x} mm wide")));
+    line("bed", p.machine.bed_mm.map(|[x, y, z]| format!("{x} × {y} × {z} mm")));
+    line("least wall", Some(format!("{} mm", p.least_wall_mm)));
+    line(
+        "clearance of moving parts",
+        Some(format!("{} mm; no supports and no brim in these gaps", p.clearance_mm)),
+    );
+    line("E reckoned with", Some(format!("{} MPa", m.e_mpa)));
+    out.push('\n');
+}
+
+fn lies(out: &mut String, part: &Laid) {
+    let up = part.lying.up;
+    let _ = writeln!(out, "\n## {}\n", part.name);
+    let named = |v: f64| if v.abs() < 5e-4 { 0.0 } else { v };
+    let how = if up.z > 0.999_999 {
+        "It lies as it is drawn".to_string()
+    } else {
+        format!(
+            "It is turned: ({:.3}, {:.3}, {:.3}) of the assembly points upwards",
+            named(up.x),
+            named(up.y),
+            named(up.z)
+        )
+    };
+    let (count, leaning) = (part.flexures.len(), part.lying.leaning().count());
+    let why = match (count, leaning) {
+        (0, _) => "it has no flexures, lies low and on its largest face".to_string(),
+        (n, 0) => {
+            format!("so all its {n} flexures run within the layers, and bending does not pull layers apart")
+        }
+        (n, k) => format!(
+            "no way of laying it keeps all its {n} flexures within the layers: {k} of them leave the layers, which part there first"
+        ),
+    };
+    let _ = writeln!(out, "{how}; {why}. {:.0} mm² rest on the bed.", part.lying.contact_mm2);
+    if count == 0 {
+        return;
+    }
+    let lines = part.process.machine.line_mm;
+    let heading = if lines.is_some() { " wall lines |" } else { "" };
+    let rule = if lines.is_some() { " --- |" } else { "" };
+    let _ = writeln!(
+        out,
+        "\n| flexure | thickness, mm | width, mm | in the layers |{heading}\n| --- | --- | --- | --- |{rule}"
+    );
+    for (leaf, posture) in part.postures() {
+        let posture_text = match posture {
+            Posture::Standing => "upright".to_string(),
+            Posture::Flat => "flat".to_string(),
+            Posture::Leaning(angle) => format!("leaves them by up to {:.0}°", angle.to_degrees()),
+        };
+        let walls = lines.map_or(String::new(), |line| format!(" {} |", wall_lines(leaf, posture, line)));
+        let _ = writeln!(
+            out,
+            "| {} | {} | {} | {posture_text} |{walls}",
+            leaf.path,
+            range(leaf.thickness_mm),
+            range(leaf.width_mm)
+        );
+    }
+}
+
+fn range([least, most]: [f64; 2]) -> String {
+    if most - least < 0.005 { format!("{most:.2}") } else { format!("{least:.2} to {most:.2}") }
+}
+
+/// How many lines make the thickness of an upright flexure, and how wide they are to be where it is no whole number.
+fn wall_lines(leaf: &Leaf, posture: Posture, line_mm: f64) -> String {
+    let [least, most] = leaf.thickness_mm;
+    if posture != Posture::Standing || most - least >= 0.005 || line_mm <= 0.0 {
+        return "—".into();
+    }
+    let count = (most / line_mm).round().max(1.0);
+    if (most / line_mm - count).abs() < WHOLE {
+        format!("{count:.0}")
+    } else {
+        format!("{count:.0} of {:.2} mm", most / count)
+    }
+}

@@ -1,0 +1,87 @@
+//! Printed parts on the bed, and what to say of them.
+
+use super::joined::Printed;
+use super::scene::Moving;
+use crate::diagnostic::Diagnostic;
+use crate::emit::plate::{Laid, Leaf, Plate};
+use crate::geometry::{FlexureSolid, Posture, lie};
+use crate::ir::Assembly;
+use rayon::prelude::*;
+
+/// Every part as it lies on its machine. `moving` is that of each design.
+pub fn plate(assembly: &Assembly, moving: &[Moving], printed: &[Printed]) -> Plate {
+    let lay = |part: &Printed| {
+        let design = |i: usize| assembly.designs.get(assembly.instances.get(i)?.design);
+        let first = part.links.first().map_or(0, |((i, _), _)| *i);
+        let (process, material) = design(first).map(|d| (d.process.clone(), d.material.clone()))?;
+        let placed = |(i, f): &(usize, usize)| {
+            let instance = assembly.instances.get(*i)?;
+            let flexure = moving.get(instance.design)?.rest.get(*f)?;
+            Some(FlexureSolid { path: instance.of(&flexure.path), ..flexure.placed(&instance.placement) })
+        };
+        let flexures: Vec<FlexureSolid> = part.flexures.iter().filter_map(placed).collect();
+        let lying = lie(&part.mesh, &flexures.iter().collect::<Vec<_>>(), process.machine.bed_mm)?;
+        Some(Laid {
+            name: part.name.clone(),
+            mesh: lying.mesh(&part.mesh),
+            lying,
+            material,
+            process,
+            flexures: flexures.iter().map(leaf).collect(),
+        })
+    };
+    Plate { name: assembly.name.clone(), parts: printed.par_iter().filter_map(lay).collect() }
+}
+
+fn leaf(flexure: &FlexureSolid) -> Leaf {
+    let range = |v: &[f64]| {
+        let ends = v.iter().fold([f64::INFINITY, 0.0_f64], |[l, h], x| [l.min(*x), h.max(*x)]);
+        ends.map(|x| 2.0 * x)
+    };
+    Leaf { path: flexure.path.clone(), thickness_mm: range(&flexure.a_mm), width_mm: range(&flexure.b_mm) }
+}
+
+/// Parts that do not fit, and flexures that leave the layers of a process that is weak across them.
+pub fn findings(assembly: &Assembly, plate: &Plate, printed: &[Printed]) -> Vec<Diagnostic> {
+    let mut found = Vec::new();
+    for part in &plate.parts {
+        let at = printed.iter().find(|p| p.name == part.name).map_or(assembly.origin, |p| p.at);
+        let (process, size) = (&part.process, part.lying.size_mm);
+        if let (Some(false), Some([x, y, z])) = (part.fits(), process.machine.bed_mm) {
+            let message = format!("`{}` does not fit on the bed of `{}`", part.name, process.name);
+            found.push(
+                Diagnostic::warning("W0645", message, at)
+                    .label(format!(
+                        "lying it is {:.0} × {:.0} × {:.0} mm, the bed {x} × {y} × {z} mm",
+                        size.x, size.y, size.z
+                    ))
+                    .help("make the mechanism smaller, or print on a process that states the larger bed of your machine"),
+            );
+        }
+        let Some(across) = process.machine.across.filter(|a| *a < 1.0) else { continue };
+        let worst = part.postures().filter_map(|(leaf, p)| match p {
+            Posture::Leaning(angle) => Some((leaf, angle)),
+            _ => None,
+        });
+        let leaning: Vec<_> = worst.collect();
+        let Some((leaf, angle)) = leaning.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
+        let message = format!(
+            "`{}` cannot be laid so that all its flexures run within the layers: {} of {} leave them",
+            part.name,
+            leaning.len(),
+            part.flexures.len()
+        );
+        found.push(
+            Diagnostic::warning("W0644", message, at)
+                .label(format!(
+                    "`{}` by {:.0}°; across its layers `{}` bears {:.0} % of what it bears within",
+                    leaf.path,
+                    angle.to_degrees(),
+                    process.name,
+                    across * 100.0
+                ))
+                .help("require less stress (`require max(stress()) <= …`), print it on a process without weak layers, or turn these joints' axes into one direction"),
+        );
+    }
+    found
+}
