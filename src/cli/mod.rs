@@ -3,6 +3,7 @@
 
 mod artefacts;
 mod commands;
+mod fmt;
 mod human;
 mod progress;
 mod released;
@@ -42,6 +43,11 @@ enum Command {
     Simulate(Simulate),
     /// Print the elaborated design as JSON
     Ir(Common),
+    /// Give `.mech` files their one look
+    ///
+    /// Line breaks stay the author's; indentation, spaces and columns become the formatter's. Comments and tokens are
+    /// kept, which is verified before anything is written. Statements with errors are left as they are.
+    Fmt(fmt::Fmt),
 }
 
 /// What every command takes.
@@ -149,12 +155,14 @@ pub fn main() -> ExitCode {
         Command::Check(common) | Command::Ir(common) => common.threads,
         Command::Build(build) => build.common.threads,
         Command::Simulate(simulate) => simulate.common.threads,
+        _ => None,
     };
     let run = || match &cli.command {
         Command::Check(common) => commands::check(common),
         Command::Build(arguments) => commands::build(arguments),
         Command::Simulate(arguments) => commands::simulate(arguments),
         Command::Ir(common) => commands::ir(common),
+        Command::Fmt(arguments) => fmt::fmt(arguments),
     };
     let code = match threads {
         None => run(),
