@@ -3,6 +3,7 @@
 
 mod artefacts;
 mod commands;
+mod fmt;
 mod human;
 mod junit;
 mod progress;
@@ -47,6 +48,11 @@ enum Command {
     Ir(Common),
     /// Check the `require` lines of many designs
     Test(test::Test),
+    /// Give `.mech` files their one look
+    ///
+    /// Line breaks stay the author's; indentation, spaces and columns become the formatter's. Comments and tokens are
+    /// kept, which is verified before anything is written. Statements with errors are left as they are.
+    Fmt(fmt::Fmt),
 }
 
 /// What every command takes.
@@ -157,6 +163,7 @@ pub fn main() -> ExitCode {
         Command::Build(build) => build.common.threads,
         Command::Simulate(simulate) => simulate.common.threads,
         Command::Test(test) => test.threads,
+        _ => None,
     };
     if let Command::Simulate(Simulate { common, .. }) | Command::Ir(common) = &cli.command {
         sarif::refuse(common.format);
@@ -167,6 +174,7 @@ pub fn main() -> ExitCode {
         Command::Simulate(arguments) => commands::simulate(arguments),
         Command::Ir(common) => commands::ir(common),
         Command::Test(arguments) => test::run(arguments),
+        Command::Fmt(arguments) => fmt::fmt(arguments),
     };
     let code = match threads {
         None => run(),

@@ -6,6 +6,7 @@
 pub mod ast;
 mod errors;
 mod expression;
+pub mod format;
 mod found;
 mod grammar;
 mod instances;
