@@ -3,7 +3,9 @@
 
 mod artefacts;
 mod commands;
+mod doc;
 mod human;
+mod new;
 mod progress;
 mod released;
 mod render;
@@ -42,6 +44,10 @@ enum Command {
     Simulate(Simulate),
     /// Print the elaborated design as JSON
     Ir(Common),
+    /// Write a design to begin with
+    New(new::New),
+    /// Show the standard library, or a file of your own, by its doc comments
+    Doc(doc::Doc),
 }
 
 /// What every command takes.
@@ -149,12 +155,15 @@ pub fn main() -> ExitCode {
         Command::Check(common) | Command::Ir(common) => common.threads,
         Command::Build(build) => build.common.threads,
         Command::Simulate(simulate) => simulate.common.threads,
+        Command::New(_) | Command::Doc(_) => None,
     };
     let run = || match &cli.command {
         Command::Check(common) => commands::check(common),
         Command::Build(arguments) => commands::build(arguments),
         Command::Simulate(arguments) => commands::simulate(arguments),
         Command::Ir(common) => commands::ir(common),
+        Command::New(arguments) => new::run(arguments),
+        Command::Doc(arguments) => doc::run(arguments),
     };
     let code = match threads {
         None => run(),
