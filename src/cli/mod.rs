@@ -3,9 +3,11 @@
 
 mod artefacts;
 mod commands;
+mod doc;
 mod fmt;
 mod human;
 mod junit;
+mod new;
 mod progress;
 mod released;
 mod render;
@@ -53,6 +55,10 @@ enum Command {
     /// Line breaks stay the author's; indentation, spaces and columns become the formatter's. Comments and tokens are
     /// kept, which is verified before anything is written. Statements with errors are left as they are.
     Fmt(fmt::Fmt),
+    /// Write a design to begin with
+    New(new::New),
+    /// Show the standard library, or a file of your own, by its doc comments
+    Doc(doc::Doc),
 }
 
 /// What every command takes.
@@ -175,6 +181,8 @@ pub fn main() -> ExitCode {
         Command::Ir(common) => commands::ir(common),
         Command::Test(arguments) => test::run(arguments),
         Command::Fmt(arguments) => fmt::fmt(arguments),
+        Command::New(arguments) => new::run(arguments),
+        Command::Doc(arguments) => doc::run(arguments),
     };
     let code = match threads {
         None => run(),

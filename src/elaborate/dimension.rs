@@ -97,6 +97,12 @@ impl Dimension {
         self.known().filter(|k| !k.dimension.is_number()).map(|k| k.written)
     }
 
+    /// The unit a designer would write for a declared type such as `length`; `1` for plain numbers.
+    pub fn unit_of_type(name: &str) -> Option<&'static str> {
+        let known = KNOWN.iter().find(|k| k.name == name)?;
+        Some(if known.written.is_empty() { known.unit } else { known.written })
+    }
+
     /// Dimension of a declared type such as `length`.
     pub fn of_type(name: &str) -> Option<Self> {
         KNOWN.iter().find(|k| k.name == name).map(|k| k.dimension)

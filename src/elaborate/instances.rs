@@ -3,6 +3,7 @@
 use super::codes;
 use super::dimension::Dimension;
 use super::eval::{Env, Evaluator, Failed, Outcome};
+use super::given::{Given, GivenKey};
 use super::load::Program;
 use super::mechanism::{Outside, quote};
 use super::placing;
@@ -43,8 +44,8 @@ pub(super) struct Parts {
     pub instances: Vec<Instance>,
     pub joined: Vec<Joined>,
     pub motors: Vec<InstanceDrive>,
-    /// Design by mechanism and bits of the scale.
-    scaled: BTreeMap<(ItemRef, u64), Option<usize>>,
+    /// Design by mechanism, bits of the scale and what is given for its parameters.
+    scaled: BTreeMap<(ItemRef, u64, Vec<GivenKey>), Option<usize>>,
     /// Design by another one and the sign of each of its drives.
     pub turned: BTreeMap<(usize, Vec<bool>), usize>,
     /// Names that were declared but went wrong: what refers to them is not reported.
@@ -220,12 +221,13 @@ impl<'a> Evaluator<'a> {
             None => Ok(1.0),
             Some(e) => self.place_scale(scope, e),
         };
-        let (item, placement, scale) = (item?, placement?, scale?);
-        let key = (item, f64::to_bits(scale));
+        let given = item.and_then(|item| self.given(scope, item, &place.overrides));
+        let (item, placement, scale, given) = (item?, placement?, scale?, given?);
+        let key = (item, f64::to_bits(scale), given.iter().map(Given::key).collect());
         let design = match parts.scaled.get(&key) {
             Some(known) => *known,
             None => {
-                let made = self.placed_design(item, scale, &place.name, outside).map(|design| {
+                let made = self.placed_design(item, scale, &given, &place.name, outside).map(|design| {
                     parts.designs.push(design);
                     parts.items.push(item);
                     parts.designs.len() - 1
@@ -289,15 +291,19 @@ impl<'a> Evaluator<'a> {
         &mut self,
         item: ItemRef,
         scale: f64,
+        given: &[Given],
         instance: &Ident,
         outside: &Outside<'_>,
     ) -> Option<Design> {
         let Some(Item::Mechanism(m)) = self.program.item(item) else { return None };
-        let settings = self.settings.below(&m.name.node);
+        let mut settings = self.settings.below(&m.name.node);
         for (i, s) in self.settings.0.iter().enumerate() {
             if s.path.strip_prefix(&m.name.node).is_some_and(|rest| rest.starts_with('.')) {
                 self.set_used.insert(i);
             }
+        }
+        for g in given {
+            settings.given(&g.name, g.value.clone());
         }
         let mut inner = Evaluator::new(self.program, &settings);
         inner.scale = scale;
@@ -317,7 +323,7 @@ impl<'a> Evaluator<'a> {
         self.out.append(&mut inner.out);
         self.used.append(&mut inner.used);
         let mut design = made.filter(|_| !bad)?;
-        if scale != 1.0 {
+        if scale != 1.0 || !given.is_empty() {
             design.name = instance.node.clone();
         }
         Some(design)

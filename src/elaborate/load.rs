@@ -445,6 +445,11 @@ fn list(names: &[String]) -> String {
     names.iter().map(|n| format!("`std.{n}`")).collect::<Vec<_>>().join(", ")
 }
 
+/// Text of a standard module, by its dotted path without the leading `std.`.
+pub fn std_text(module: &str) -> Option<&'static str> {
+    STDLIB.get_file(format!("{}.mech", module.replace('.', "/")))?.contents_utf8()
+}
+
 /// Dotted paths of all standard modules without the leading `std.`, sorted.
 pub fn std_modules() -> Vec<String> {
     fn walk(dir: &Dir<'_>, out: &mut Vec<String>) {

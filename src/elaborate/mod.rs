@@ -14,6 +14,7 @@ mod forms;
 mod frames;
 mod free;
 mod functions;
+mod given;
 mod goals;
 mod graph;
 mod instances;
@@ -48,7 +49,7 @@ mod value;
 use crate::diagnostic::{Diagnostic, Edit, Fix, Origin, SourceMap};
 use crate::ir::{Assembly, Design};
 use crate::syntax::ast::{self, Item, Mechanism};
-pub use load::std_modules;
+pub use load::{std_modules, std_text};
 use settings::Settings;
 use std::fmt;
 

@@ -59,6 +59,14 @@ impl Settings {
         Self(self.0.iter().filter_map(inside).collect())
     }
 
+    /// Adds what a text gives for a parameter that is not set already.
+    pub fn given(&mut self, path: &str, value: Expr) {
+        if self.find(path).is_none() {
+            let at = value.at;
+            self.0.push(Setting { path: path.to_string(), value: Some(value), at });
+        }
+    }
+
     /// The setting of `path`: its index and value (none: it was not understood).
     pub fn find(&self, path: &str) -> Option<(usize, Option<&Expr>)> {
         let i = self.0.iter().position(|s| s.path == path)?;

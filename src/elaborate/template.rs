@@ -9,7 +9,7 @@ use super::scope::{Local, LocalKind, State};
 use super::value::{ItemRef, Scalar, Value};
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::ir::{Body, BodyId, JointId, JointKind, Rod, RodEnd, Section};
-use crate::syntax::ast::{self, Expr, ExprKind, Flexure, Ident, Item, StatementKind, TemplateUse};
+use crate::syntax::ast::{self, Expr, ExprKind, Flexure, Ident, Item, Statement, StatementKind, TemplateUse};
 
 /// Most rods of a design.
 const MAX_RODS: usize = 1024;
@@ -91,7 +91,7 @@ impl<'a> Evaluator<'a> {
         self.limit(text.overrides.len(), "overrides", text.name.at)?;
         let inner = self.scope(owner);
         self.given_names(inner, site, text.name.at)?;
-        let mut ok = self.check_overrides(flexure, text);
+        let mut ok = self.check_overrides(&flexure.name.node, &flexure.statements, &text.overrides);
         for s in &flexure.statements {
             match &s.kind {
                 StatementKind::Param { name, ty, value } => {
@@ -237,10 +237,16 @@ impl<'a> Evaluator<'a> {
         self.declare(inner, Local { name: name.node.clone(), at: name.at, kind, state: State::Waiting });
     }
 
-    fn check_overrides(&mut self, flexure: &'a Flexure, text: &'a TemplateUse) -> Outcome<()> {
+    /// Whether all names are parameters of what `owner` declares, each once.
+    pub(super) fn check_overrides(
+        &mut self,
+        owner: &str,
+        statements: &[Statement],
+        overrides: &[(Ident, Expr)],
+    ) -> Outcome<()> {
         let mut ok = Ok(());
-        for (i, (name, _)) in text.overrides.iter().enumerate() {
-            if let Some((first, _)) = text.overrides.iter().take(i).find(|(n, _)| n.node == name.node) {
+        for (i, (name, _)) in overrides.iter().enumerate() {
+            if let Some((first, _)) = overrides.iter().take(i).find(|(n, _)| n.node == name.node) {
                 ok = self.fail(
                     Diagnostic::error(codes::DUPLICATE, format!("`{}` is given twice", name.node), name.at)
                         .label("again here")
@@ -248,8 +254,7 @@ impl<'a> Evaluator<'a> {
                 );
                 continue;
             }
-            let template = &flexure.name.node;
-            let declared = flexure.statements.iter().find_map(|s| match &s.kind {
+            let declared = statements.iter().find_map(|s| match &s.kind {
                 StatementKind::Param { name: n, .. } if n.node == name.node => Some((true, n)),
                 StatementKind::Let { name: n, .. } if n.node == name.node => Some((false, n)),
                 _ => None,
@@ -259,7 +264,7 @@ impl<'a> Evaluator<'a> {
                     ok = self.fail(
                         Diagnostic::error(
                             codes::PRIVATE,
-                            format!("`{}` is private to `{template}`", n.node),
+                            format!("`{}` is private to `{owner}`", n.node),
                             name.at,
                         )
                         .also(n.at, "declared here"),
@@ -270,15 +275,14 @@ impl<'a> Evaluator<'a> {
                     ok = self.fail(
                         Diagnostic::error(
                             codes::WRONG_KIND,
-                            format!("`{}` is a `let` of `{template}`, not a parameter", name.node),
+                            format!("`{}` is a `let` of `{owner}`, not a parameter", name.node),
                             name.at,
                         )
                         .also(n.at, "declared here"),
                     );
                 }
                 None => {
-                    let params: Vec<&str> = flexure
-                        .statements
+                    let params: Vec<&str> = statements
                         .iter()
                         .filter_map(|s| match &s.kind {
                             StatementKind::Param { name, .. } if !name.node.starts_with('_') => {
@@ -289,7 +293,7 @@ impl<'a> Evaluator<'a> {
                         .collect();
                     let d = Diagnostic::error(
                         codes::UNKNOWN_NAME,
-                        format!("`{template}` has no parameter `{}`", name.node),
+                        format!("`{owner}` has no parameter `{}`", name.node),
                         name.at,
                     );
                     ok = self.fail(match super::names::suggestion(&name.node, params.iter().copied()) {

@@ -243,7 +243,7 @@ pub enum StatementKind {
     Load(Box<Load>),
     /// `rod NAME { [axis second] from a at … along … to b at … along … section … }` (templates only)
     Rod(Box<Rod>),
-    /// `place NAME = MECHANISM at P [turned A about D] [scale = K] [merging GROUND into BODY]…`
+    /// `place NAME = MECHANISM [{ overrides }] at P [turned A about D] [scale = K] [merging GROUND into BODY]…`
     Place(Box<Place>),
     /// `mirror NAME = INSTANCE across yz [sharing BODY, …]`
     Mirror(Box<Mirror>),
@@ -354,6 +354,8 @@ pub struct Place {
     pub name: Ident,
     /// The mechanism.
     pub mechanism: Ident,
+    /// `{ name = value … }`: its parameters, in order.
+    pub overrides: Vec<(Ident, Expr)>,
     /// Where its origin goes.
     pub point: Expr,
     /// `turned A about D`.

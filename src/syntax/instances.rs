@@ -10,7 +10,9 @@ impl Lower<'_> {
         let mut names = self.idents(node).into_iter();
         let (name, mechanism) = (names.next()?, names.next()?);
         let point = self.value(node)?;
-        let mut place = Place { name, mechanism, point, turned: None, scale: None, merging: Vec::new() };
+        let overrides = self.overrides(node);
+        let (turned, scale, merging) = (None, None, Vec::new());
+        let mut place = Place { name, mechanism, overrides, point, turned, scale, merging };
         let mut seen: Vec<(Kind, Origin)> = Vec::new();
         for clause in node.parts() {
             let kind = clause.kind;

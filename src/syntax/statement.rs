@@ -144,11 +144,15 @@ impl Lower<'_> {
     }
 
     fn template(&mut self, node: &Node) -> Option<TemplateUse> {
-        let overrides = match node.first(Kind::Overrides) {
+        Some(TemplateUse { name: self.ident(node)?, overrides: self.overrides(node) })
+    }
+
+    /// `{ name = value … }` directly in a node, if it has them.
+    pub(super) fn overrides(&mut self, node: &Node) -> Vec<(Ident, Expr)> {
+        match node.first(Kind::Overrides) {
             Some(list) => list.all(Kind::Field).filter_map(|n| self.field(n)).collect(),
             None => Vec::new(),
-        };
-        Some(TemplateUse { name: self.ident(node)?, overrides })
+        }
     }
 
     fn drive(&mut self, node: &Node) -> Option<StatementKind> {
