@@ -3,6 +3,8 @@
 
 mod artefacts;
 mod commands;
+mod diff;
+mod git;
 mod human;
 mod junit;
 mod progress;
@@ -47,6 +49,8 @@ enum Command {
     Ir(Common),
     /// Check the `require` lines of many designs
     Test(test::Test),
+    /// Compare two versions of a design: names, numbers, behaviour
+    Diff(diff::Diff),
 }
 
 /// What every command takes.
@@ -157,6 +161,7 @@ pub fn main() -> ExitCode {
         Command::Build(build) => build.common.threads,
         Command::Simulate(simulate) => simulate.common.threads,
         Command::Test(test) => test.threads,
+        Command::Diff(diff) => diff.threads,
     };
     if let Command::Simulate(Simulate { common, .. }) | Command::Ir(common) = &cli.command {
         sarif::refuse(common.format);
@@ -167,6 +172,7 @@ pub fn main() -> ExitCode {
         Command::Simulate(arguments) => commands::simulate(arguments),
         Command::Ir(common) => commands::ir(common),
         Command::Test(arguments) => test::run(arguments),
+        Command::Diff(arguments) => diff::run(arguments),
     };
     let code = match threads {
         None => run(),

@@ -7,7 +7,7 @@ use super::style::Style;
 use super::{Common, Format, junit};
 use clap::{Args, ValueEnum};
 use flexura::diagnostic::{Diagnostic, Severity, SourceMap, terminal};
-use flexura::pipeline::{Compiler, Examined, RequirementResult, Values, examine, placeless};
+use flexura::pipeline::{Compiler, Examined, Extent, RequirementResult, Values, examine, placeless};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -198,7 +198,7 @@ fn examined(path: &Path, solve: bool) -> (Examined, Vec<PathBuf>) {
     let never = AtomicBool::new(false);
     let values = if solve { Values::Solve(&Silent, &never) } else { Values::Lock };
     let Opened { request, folder, .. } = &opened;
-    found = examine(request, values, false, &Compiler::default(), folder);
+    found = examine(request, values, Extent::Measures, &Compiler::default(), folder);
     let files = found.outcome.sources.files.iter();
     let own = files.filter(|f| f.name.ends_with(".mech") && !f.name.starts_with("std/"));
     let read = own.map(|f| folder.root().join(&f.name)).collect();

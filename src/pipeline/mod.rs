@@ -16,7 +16,7 @@ mod stages;
 
 pub use aims::{AimSeries, DirectionMeasures, OutputMeasures};
 pub use compiler::{Compiler, EDGES};
-pub use examine::{Examined, Values, examine};
+pub use examine::{Examined, Extent, Values, examine};
 pub use manifest::COMPILER;
 pub use measure::{aggregate, check_requirements, is_closed, measure};
 pub use progress::{Iteration, Progress, Stage};
