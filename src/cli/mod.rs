@@ -64,6 +64,9 @@ struct Common {
     /// Number of steps of the cycle
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     steps: Option<u32>,
+    /// The variant of this name, in place of the design as it stands
+    #[arg(long, value_name = "NAME")]
+    variant: Option<String>,
     /// Number of threads [default: one a core]; the result does not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -86,6 +89,9 @@ enum Format {
 struct Build {
     #[command(flatten)]
     common: Common,
+    /// Build the design as it stands and all its variants, each into a folder of its name in the output folder
+    #[arg(long, conflicts_with = "variant")]
+    all_variants: bool,
     /// Folder for everything that is made
     #[arg(long, value_name = "FOLDER", default_value = "out")]
     out: PathBuf,

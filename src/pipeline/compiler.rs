@@ -49,11 +49,13 @@ impl Stages for Compiler {
         source: &str,
         overrides: &[(String, String)],
         steps: Option<usize>,
+        variant: Option<&str>,
         files: &dyn Files,
     ) -> Checked {
-        let options = Options { set: overrides.to_vec(), steps };
+        let options = Options { set: overrides.to_vec(), steps, variant: variant.map(String::from) };
         let out = elaborate(source, files, &options);
-        Checked { sources: out.sources, assembly: out.assembly, diagnostics: out.diagnostics }
+        let (sources, assembly, variants) = (out.sources, out.assembly, out.variants);
+        Checked { sources, assembly, variants, diagnostics: out.diagnostics }
     }
 
     fn rigid(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
@@ -234,7 +236,10 @@ impl Stages for Compiler {
             let bytes = stl_bytes(&part.mesh).map_err(|e| {
                 vec![Diagnostic::error("E0631", format!("no STL can be written: {e}"), assembly.origin)]
             })?;
-            artefacts.push(Artefact { name: format!("{}.stl", part.name), bytes });
+            artefacts.push(Artefact {
+                name: format!("{}.stl", part.name.replace('[', "-").replace(']', "")),
+                bytes,
+            });
         }
         Ok((artefacts, found))
     }

@@ -43,6 +43,8 @@ pub struct Request {
     pub overrides: Vec<(String, String)>,
     /// `--steps`.
     pub steps: Option<usize>,
+    /// `--variant`.
+    pub variant: Option<String>,
     /// The lock as it stands: its name and text.
     pub lock: Option<(String, String)>,
     /// Ignore the lock, and what has been made before.
@@ -228,8 +230,10 @@ fn front_end(
     files: &dyn Files,
     out: &mut BuildOutcome,
 ) -> Option<Assembly> {
-    let checked = stages.check(&request.source, &request.overrides, request.steps, files);
+    let checked =
+        stages.check(&request.source, &request.overrides, request.steps, request.variant.as_deref(), files);
     out.sources = checked.sources;
+    out.variants = checked.variants;
     out.diagnostics.extend(checked.diagnostics);
     if out.diagnostics.iter().any(Diagnostic::is_error) {
         return None;
