@@ -4,6 +4,7 @@
 //! the folders of this crate carry the names used there.
 
 pub mod diagnostic;
+pub mod diff;
 pub mod doc;
 pub mod elaborate;
 pub mod emit;

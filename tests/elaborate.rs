@@ -41,7 +41,7 @@ fn run(text: &str) -> Elaborated {
 fn run_with(text: &str, set: &[(&str, &str)]) -> Elaborated {
     let files = BTreeMap::from([("main.mech".to_string(), text.to_string())]);
     let set = set.iter().map(|(a, b)| (a.to_string(), b.to_string())).collect();
-    elaborate("main.mech", &files, &Options { set, steps: None })
+    elaborate("main.mech", &files, &Options { set, ..Options::default() })
 }
 
 fn design(e: Elaborated) -> Design {
@@ -413,7 +413,7 @@ fn settings_that_are_wrong_are_errors() {
 #[test]
 fn steps_can_be_given_from_outside() {
     let files = BTreeMap::from([("main.mech".to_string(), CHEBYSHEV.to_string())]);
-    let go = |n| elaborate("main.mech", &files, &Options { set: vec![], steps: Some(n) });
+    let go = |n| elaborate("main.mech", &files, &Options { steps: Some(n), ..Options::default() });
     assert_eq!(go(120).design.unwrap().cycle.steps, 120);
     assert_eq!(found(&go(0)), ["E0413 `--steps 0` is not from 1 to 100000"]);
 }

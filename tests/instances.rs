@@ -31,7 +31,7 @@ fn file(text: &str) -> BTreeMap<String, String> {
 
 fn run(text: &str, set: &[(&str, &str)]) -> Elaborated {
     let set = set.iter().map(|(a, b)| (a.to_string(), b.to_string())).collect();
-    elaborate("main.mech", &file(text), &Options { set, steps: None })
+    elaborate("main.mech", &file(text), &Options { set, ..Options::default() })
 }
 
 fn assembly(text: &str) -> Assembly {
@@ -54,9 +54,10 @@ impl Stages for Counted {
         source: &str,
         set: &[(String, String)],
         steps: Option<usize>,
+        variant: Option<&str>,
         files: &dyn Files,
     ) -> Checked {
-        self.compiler.check(source, set, steps, files)
+        self.compiler.check(source, set, steps, variant, files)
     }
     fn rigid(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
         self.compiler.rigid(design, values)

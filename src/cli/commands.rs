@@ -119,55 +119,111 @@ fn motion_json(out: &BuildOutcome, table: Option<&MotionTable>) -> serde_json::V
 
 /// `flexura build`.
 pub fn build(arguments: &Build) -> u8 {
-    let common = &arguments.common;
+    let format = arguments.common.format;
+    let progress = Terminal::new(format == Format::Human);
+    let cancel = stop_on_ctrl_c(progress.on_stop());
+    let mut builds = vec![build_one(arguments, arguments.common.variant.as_deref(), &progress, &cancel)];
+    if arguments.all_variants {
+        let variants = builds.first().map(|(out, _)| out.variants.clone()).unwrap_or_default();
+        for variant in &variants {
+            // What was interrupted is not taken up by the next one.
+            if !cancel.load(Ordering::SeqCst) {
+                builds.push(build_one(arguments, Some(variant), &progress, &cancel));
+            }
+        }
+    }
+    progress.finish();
+    match builds.as_slice() {
+        [(out, written)] if !arguments.all_variants => finish_build(out, format, written),
+        _ => finish_builds(&builds, format),
+    }
+}
+
+type Built = (BuildOutcome, Vec<(String, usize)>);
+
+/// Builds the design as it stands, or a variant of it, into its folder; also what was written.
+fn build_one(arguments: &Build, variant: Option<&str>, progress: &Terminal, cancel: &AtomicBool) -> Built {
+    let common = &Common { variant: variant.map(String::from), ..arguments.common.clone() };
+    let folder = variant.map_or(arguments.out.clone(), |variant| arguments.out.join(variant));
     let mut opened = match open(common) {
         Ok(opened) => opened,
-        Err(why) => return finish_build(unopened(&why), common.format, &[]),
+        Err(why) => return (unopened(&why), Vec::new()),
     };
     opened.request.fresh = arguments.fresh;
     opened.request.resume = arguments.resume;
     opened.request.frozen = arguments.frozen;
-    let lock_path = match opened.read_lock(common, &arguments.out) {
+    let lock_path = match opened.read_lock(common, &folder) {
         Ok(path) => path,
-        Err(why) => return finish_build(unopened(&why), common.format, &[]),
+        Err(why) => return (unopened(&why), Vec::new()),
     };
-    let progress = Terminal::new(common.format == Format::Human);
-    let cancel = stop_on_ctrl_c(progress.on_stop());
     let compiler = Compiler { method: arguments.optimizer.into(), iterations: arguments.iterations as usize };
-    let made = Output(&arguments.out);
-    let mut out = pipeline::build_upon(&opened.request, &made, &compiler, &opened.folder, &progress, &cancel);
-    progress.finish();
+    let made = Output(&folder);
+    let mut out = pipeline::build_upon(&opened.request, &made, &compiler, &opened.folder, progress, cancel);
     opened.name_as_written(&mut out.sources);
-    let written = match write(&out, &arguments.out, &lock_path) {
+    let written = match write(&out, &folder, &lock_path) {
         Ok(written) => written,
         Err(e) => {
             out.diagnostics.push(placeless(Severity::Error, "E0731", e.to_string()));
             Vec::new()
         }
     };
-    finish_build(out, common.format, &written)
+    (out, written)
+}
+
+/// Reports the builds of a design and of its variants.
+fn finish_builds(builds: &[Built], format: Format) -> u8 {
+    let names = builds.first().map(|(out, _)| out.variants.as_slice()).unwrap_or_default();
+    let names = std::iter::once(None).chain(names.iter().map(Some));
+    let mut worst = FINE;
+    let mut all = Vec::new();
+    let (mut found, mut sources) = (Vec::new(), SourceMap::default());
+    for ((out, written), name) in builds.iter().zip(names) {
+        match format {
+            Format::Human => {
+                let of = name.map_or("as it stands".into(), |name| format!("variant {name}"));
+                print(&format!("{}\n", Style::stdout().bold(&of)));
+                worst = worst.max(finish_build(out, format, written));
+            }
+            Format::Json => all.push(serde_json::json!({ "variant": name, "build": json(out) })),
+            Format::Sarif => {
+                let new: Vec<_> = out.diagnostics.iter().filter(|d| !found.contains(*d)).cloned().collect();
+                found.extend(new);
+                // All read the same files in the same order; locks are the last.
+                if out.sources.files.len() > sources.files.len() {
+                    sources = out.sources.clone();
+                }
+            }
+        }
+        worst = worst.max(code(out));
+    }
+    match format {
+        Format::Human => {}
+        Format::Json => worst = worst.max(print(&format!("{}\n", serde_json::json!({ "builds": all })))),
+        Format::Sarif => worst = worst.max(super::sarif::print(&found, &sources)),
+    }
+    worst
 }
 
 /// Reports a build, in either format.
-fn finish_build(out: BuildOutcome, format: Format, written: &[(String, usize)]) -> u8 {
+fn finish_build(out: &BuildOutcome, format: Format, written: &[(String, usize)]) -> u8 {
     match format {
         Format::Human => {
             render::show(&out.diagnostics, &out.sources);
             match &out.assembly {
                 Some(_) => {
-                    print(&human::report(&out, written, Style::stdout()));
+                    print(&human::report(out, written, Style::stdout()));
                 }
                 None => tell(&format!("{}\n", render::counts(&out.diagnostics))),
             }
         }
         Format::Json => {
-            print(&format!("{}\n", json(&out)));
+            print(&format!("{}\n", json(out)));
         }
         Format::Sarif => {
             super::sarif::print(&out.diagnostics, &out.sources);
         }
     }
-    code(&out)
+    code(out)
 }
 
 /// The object that scripts rely on.
@@ -250,6 +306,7 @@ pub fn open(common: &Common) -> Result<Opened, (PathBuf, FileError)> {
         source,
         overrides: common.overrides.clone(),
         steps: common.steps.map(|n| n as usize),
+        variant: common.variant.clone(),
         ..Request::default()
     };
     Ok(Opened { folder, request, shown })
@@ -268,7 +325,8 @@ impl Opened {
     /// Reads the lock, if there is one; returns where it belongs.
     pub fn read_lock(&mut self, common: &Common, out: &Path) -> Result<PathBuf, (PathBuf, FileError)> {
         let stem = self.request.source.strip_suffix(".mech").unwrap_or(&self.request.source);
-        let name = format!("{stem}.lock");
+        let variant = self.request.variant.as_ref().map(|v| format!(".{v}")).unwrap_or_default();
+        let name = format!("{stem}{variant}.lock");
         let tried_out = !common.overrides.is_empty() || common.steps.is_some();
         let path = if tried_out { out.join(&name) } else { self.shown.join(&name) };
         match read_text(&path) {

@@ -3,8 +3,10 @@
 
 mod artefacts;
 mod commands;
+mod diff;
 mod doc;
 mod fmt;
+mod git;
 mod human;
 mod junit;
 mod new;
@@ -59,6 +61,8 @@ enum Command {
     New(new::New),
     /// Show the standard library, or a file of your own, by its doc comments
     Doc(doc::Doc),
+    /// Compare two versions of a design: names, numbers, behaviour
+    Diff(diff::Diff),
 }
 
 /// What every command takes.
@@ -72,6 +76,9 @@ struct Common {
     /// Number of steps of the cycle
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     steps: Option<u32>,
+    /// The variant of this name, in place of the design as it stands
+    #[arg(long, value_name = "NAME")]
+    variant: Option<String>,
     /// Number of threads [default: one a core]; the result does not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -94,6 +101,9 @@ enum Format {
 struct Build {
     #[command(flatten)]
     common: Common,
+    /// Build the design as it stands and all its variants, each into a folder of its name in the output folder
+    #[arg(long, conflicts_with = "variant")]
+    all_variants: bool,
     /// Folder for everything that is made
     #[arg(long, value_name = "FOLDER", default_value = "out")]
     out: PathBuf,
@@ -169,6 +179,7 @@ pub fn main() -> ExitCode {
         Command::Build(build) => build.common.threads,
         Command::Simulate(simulate) => simulate.common.threads,
         Command::Test(test) => test.threads,
+        Command::Diff(diff) => diff.threads,
         _ => None,
     };
     if let Command::Simulate(Simulate { common, .. }) | Command::Ir(common) = &cli.command {
@@ -183,6 +194,7 @@ pub fn main() -> ExitCode {
         Command::Fmt(arguments) => fmt::fmt(arguments),
         Command::New(arguments) => new::run(arguments),
         Command::Doc(arguments) => doc::run(arguments),
+        Command::Diff(arguments) => diff::run(arguments),
     };
     let code = match threads {
         None => run(),

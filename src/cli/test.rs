@@ -7,7 +7,7 @@ use super::style::Style;
 use super::{Common, Format, junit};
 use clap::{Args, ValueEnum};
 use flexura::diagnostic::{Diagnostic, Severity, SourceMap, terminal};
-use flexura::pipeline::{Compiler, Examined, RequirementResult, Values, examine, placeless};
+use flexura::pipeline::{Compiler, Examined, Extent, RequirementResult, Values, examine, placeless};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -18,7 +18,7 @@ use std::sync::atomic::AtomicBool;
 /// Arguments of `flexura test`.
 ///
 /// Every design is simulated with the values of its lock and held against its `require` lines; exit code 1 where one
-/// fails or a design cannot be tested. In folders all `.mech` files are looked at, also in folders below; files without a
+/// fails or a design cannot be tested. Its variants are tested too, each from its own lock. In folders all `.mech` files are looked at, also in folders below; files without a
 /// mechanism, and parts that another design imports and that have no lock of their own, are passed over.
 #[derive(Debug, Args)]
 pub struct Test {
@@ -64,6 +64,8 @@ pub enum Status {
 pub struct Tested {
     /// As the user can reach it.
     pub source: String,
+    /// Which of its variants; none: as it stands.
+    pub variant: Option<String>,
     /// What became of it.
     pub status: Status,
     /// Why it was passed over.
@@ -77,6 +79,14 @@ pub struct Tested {
 }
 
 impl Tested {
+    /// Source and variant.
+    pub fn name(&self) -> String {
+        match &self.variant {
+            Some(variant) => format!("{} ({variant})", self.source),
+            None => self.source.clone(),
+        }
+    }
+
     /// Findings as text without colours; only those that `wanted` picks.
     pub fn told(&self, wanted: impl Fn(&Diagnostic) -> bool) -> String {
         let found: Vec<Diagnostic> = self.diagnostics.iter().filter(|d| wanted(d)).cloned().collect();
@@ -101,8 +111,11 @@ pub fn is_requirement(d: &Diagnostic) -> bool {
 }
 
 /// A design to be tested.
+#[derive(Clone)]
 struct Unit {
     path: PathBuf,
+    /// As it stands, or one of its variants.
+    variant: Option<String>,
     /// The user named the file itself.
     named: bool,
 }
@@ -111,8 +124,24 @@ struct Unit {
 pub fn run(arguments: &Test) -> u8 {
     let mut missing = Vec::new();
     let units = units(&arguments.paths, &mut missing);
-    let found: Vec<(Examined, Vec<PathBuf>)> =
-        units.par_iter().map(|u| examined(&u.path, arguments.solve)).collect();
+    let examine_all = |units: &[Unit]| -> Vec<(Examined, Vec<PathBuf>)> {
+        units.par_iter().map(|u| examined(u, arguments.solve)).collect()
+    };
+    let plain = examine_all(&units);
+    let of = |(unit, (examined, _)): (&Unit, &(Examined, Vec<PathBuf>))| -> Vec<Unit> {
+        let variants = examined.outcome.variants.iter();
+        variants.map(|v| Unit { variant: Some(v.clone()), ..unit.clone() }).collect()
+    };
+    let variants: Vec<Vec<Unit>> = units.iter().zip(&plain).map(of).collect();
+    let mut more = examine_all(&variants.concat()).into_iter();
+    let (mut all, mut found) = (Vec::new(), Vec::new());
+    for ((unit, examined), variants) in units.into_iter().zip(plain).zip(variants) {
+        all.push(unit);
+        found.push(examined);
+        found.extend(more.by_ref().take(variants.len()));
+        all.extend(variants);
+    }
+    let units = all;
     let imported: BTreeSet<&PathBuf> = found.iter().flat_map(|(_, read)| read.iter().skip(1)).collect();
     let judge = |(unit, (examined, read)): (&Unit, &(Examined, Vec<PathBuf>))| {
         let is_part = read.first().is_some_and(|own| imported.contains(own));
@@ -147,9 +176,9 @@ fn units(paths: &[PathBuf], missing: &mut Vec<(PathBuf, String)>) -> Vec<Unit> {
             if below.is_empty() {
                 missing.push((path.clone(), "there is no `.mech` file in this folder".into()));
             }
-            units.extend(below.into_iter().map(|path| Unit { path, named: false }));
+            units.extend(below.into_iter().map(|path| Unit { path, variant: None, named: false }));
         } else {
-            units.push(Unit { path: path.clone(), named: true });
+            units.push(Unit { path: path.clone(), variant: None, named: true });
         }
     }
     let mut seen = BTreeSet::new();
@@ -178,8 +207,9 @@ fn collect(folder: &Path, into: &mut Vec<PathBuf>) -> Result<(), (PathBuf, Strin
 }
 
 /// Examines a design; also the files it read, its own first.
-fn examined(path: &Path, solve: bool) -> (Examined, Vec<PathBuf>) {
-    let common = Common::of(path);
+fn examined(unit: &Unit, solve: bool) -> (Examined, Vec<PathBuf>) {
+    let path = unit.path.as_path();
+    let common = Common { variant: unit.variant.clone(), ..Common::of(path) };
     let mut found = Examined::default();
     let mut opened = match open(&common) {
         Ok(opened) => opened,
@@ -198,7 +228,7 @@ fn examined(path: &Path, solve: bool) -> (Examined, Vec<PathBuf>) {
     let never = AtomicBool::new(false);
     let values = if solve { Values::Solve(&Silent, &never) } else { Values::Lock };
     let Opened { request, folder, .. } = &opened;
-    found = examine(request, values, false, &Compiler::default(), folder);
+    found = examine(request, values, Extent::Measures, &Compiler::default(), folder);
     let files = found.outcome.sources.files.iter();
     let own = files.filter(|f| f.name.ends_with(".mech") && !f.name.starts_with("std/"));
     let read = own.map(|f| folder.root().join(&f.name)).collect();
@@ -209,7 +239,8 @@ fn examined(path: &Path, solve: bool) -> (Examined, Vec<PathBuf>) {
         found.outcome.diagnostics.push(placeless(Severity::Error, "E0731", e.to_string()));
     }
     for d in found.outcome.diagnostics.iter_mut().filter(|d| d.code == "E0714") {
-        d.help = Some(format!("`flexura build {}` solves it and writes its lock", path.display()));
+        let variant = unit.variant.as_ref().map(|v| format!(" --variant {v}")).unwrap_or_default();
+        d.help = Some(format!("`flexura build {}{variant}` solves it and writes its lock", path.display()));
     }
     (found, read)
 }
@@ -233,6 +264,7 @@ fn judged(unit: &Unit, examined: &Examined, is_part: bool) -> Tested {
     };
     Tested {
         source: unit.path.display().to_string(),
+        variant: unit.variant.clone(),
         status,
         why,
         requirements: out.requirements.clone(),
@@ -245,6 +277,7 @@ fn not_found((path, why): (PathBuf, String)) -> Tested {
     let message = format!("cannot read `{}`: {why}", path.display());
     Tested {
         source: path.display().to_string(),
+        variant: None,
         status: Status::Error,
         why: "",
         requirements: Vec::new(),
@@ -256,7 +289,7 @@ fn not_found((path, why): (PathBuf, String)) -> Tested {
 /// A line a design, failing requirements below it; findings on the standard error.
 fn human(tested: &[Tested]) -> u8 {
     let style = Style::stdout();
-    let width = tested.iter().map(|t| t.source.chars().count()).max().unwrap_or(0);
+    let width = tested.iter().map(|t| t.name().chars().count()).max().unwrap_or(0);
     let mut text = String::new();
     for t in tested {
         // What a requirement measured stands in the summary.
@@ -272,7 +305,7 @@ fn human(tested: &[Tested]) -> u8 {
             Status::Error => (style.red("FAIL"), render::counts(&found)),
             Status::Skipped => (style.dim("skip"), t.why.into()),
         };
-        let _ = writeln!(text, "{verdict}  {:width$}  {what}", t.source);
+        let _ = writeln!(text, "{verdict}  {:width$}  {what}", t.name());
         for r in t.requirements.iter().filter(|r| !r.pass) {
             let measured =
                 r.value.map_or("could not be measured".into(), |v| format!("measured {v:.3} {}", r.unit));
@@ -309,6 +342,7 @@ fn json(tested: &[Tested]) -> serde_json::Value {
         .map(|t| {
             serde_json::json!({
                 "source": t.source,
+                "variant": t.variant,
                 "status": t.status,
                 "requirements": t.requirements,
                 "diagnostics": render::json(&t.diagnostics, &t.sources),
@@ -328,6 +362,6 @@ impl Common {
     /// A design as it is written.
     pub fn of(source: &Path) -> Self {
         let (source, overrides) = (source.to_path_buf(), Vec::new());
-        Self { source, overrides, steps: None, threads: None, format: Format::Human }
+        Self { source, overrides, steps: None, variant: None, threads: None, format: Format::Human }
     }
 }

@@ -33,6 +33,7 @@ codes! {
     SET_UNKNOWN "E0114" "`--set` of something that cannot be set";
     SET_SYNTAX "E0115" "`--set` with a value that is not an expression";
     EDITION "E0116" "an edition this version does not know";
+    NO_VARIANT "E0117" "a variant that does not exist";
     DIMENSION "E0201" "dimensions that do not fit";
     MISSING_UNIT "E0202" "a bare number where a quantity is needed";
     TYPE "E0203" "a value of the wrong type";
@@ -66,6 +67,8 @@ codes! {
     EXPORT "E0415" "an export that lacks what it needs";
     KEYS "E0416" "keys of a drive that do not run from 0 % to 100 %";
     NOT_DRIVEN "E0417" "a drive of a joint that has no single value";
+    ASSERTION "E0418" "an assertion that does not hold";
+    INDEX "E0419" "an index that is no whole number";
     MODEL "E0430" "a theory of flexures that does not exist";
     TAPER "E0431" "a rod between sections of different shape";
     NONCONSERVATIVE "E0440" "a moment whose work would depend on the way";

@@ -5,6 +5,7 @@ use super::dimension::Dimension;
 use super::eval::{Env, Evaluator, Failed, Outcome};
 use super::given::{Given, GivenKey};
 use super::load::Program;
+use super::loops;
 use super::mechanism::{Outside, quote};
 use super::placing;
 use super::queries::{Queries, Query, drive_texts};
@@ -19,7 +20,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Whether a mechanism is made of others.
 pub fn is_assembly(m: &Mechanism) -> bool {
-    m.statements.iter().any(|s| matches!(s.kind, StatementKind::Place(_) | StatementKind::Mirror(_)))
+    m.statements
+        .iter()
+        .any(|s| matches!(s.kind, StatementKind::Place(_) | StatementKind::Mirror(_) | StatementKind::For(_)))
 }
 
 /// What elaborating an assembly gives.
@@ -87,9 +90,11 @@ pub fn assemble(
     outside: &Outside<'_>,
     is_root: bool,
 ) -> Assembled {
-    let queries = Queries::of(m);
+    let written = loops::written_out(program, settings, m, outside.module);
+    let queries = Queries::of(&written.mechanism, &written.turns);
     let mut e = Evaluator::new(program, settings);
-    let assembly = e.assembly(m, outside, &queries);
+    (e.out, e.used) = (written.out, written.used);
+    let assembly = e.assembly(&written.mechanism, outside, &queries);
     if is_root {
         e.unused_settings();
     }
@@ -107,6 +112,7 @@ impl<'a> Evaluator<'a> {
         let scope = self.scope(outside.module);
         let sheet = self.sheet(scope, m);
         self.force_all(scope);
+        self.assertions(scope, &sheet);
         self.only_instances(&sheet, m);
         let grounds: BTreeSet<&str> = sheet.bodies.iter().map(|b| b.name.node.as_str()).collect();
         let mut parts = Parts::default();
@@ -494,7 +500,7 @@ impl<'a> Evaluator<'a> {
         let (traces, drives) = self.inside(design);
         let (left, op, right) = &query.text;
         let text = super::sheet::RequireText { left, op: *op, right, at: query.at };
-        let line = quote(outside.sources, query.at);
+        let line = format!("{}{}", quote(outside.sources, query.at), query.turn);
         let inner = self.scope_inside(scope);
         let requirement = self.requirement(inner, &text, &traces, &drives, &line)?;
         Ok(AssemblyRequirement { instance, requirement })

@@ -34,6 +34,7 @@ impl<'a> Evaluator<'a> {
         let mut sheet = self.sheet(scope, m);
         sheet.broken |= self.program.modules.get(module).is_some_and(|m| m.broken);
         self.force_all(scope);
+        self.assertions(scope, &sheet);
         let material = match sheet.material {
             Some((name, _)) => {
                 self.record_named(module, name, "material").and_then(|item| self.material(item)).ok()

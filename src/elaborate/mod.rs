@@ -5,6 +5,7 @@
 
 mod aims;
 mod arithmetic;
+mod assertions;
 mod check;
 pub mod codes;
 pub mod dimension;
@@ -21,6 +22,7 @@ mod instances;
 mod load;
 mod loads;
 mod lookup;
+mod loops;
 mod mechanism;
 mod members;
 mod mirroring;
@@ -45,6 +47,7 @@ mod terms;
 mod theory;
 pub mod units;
 mod value;
+mod variants;
 
 use crate::diagnostic::{Diagnostic, Edit, Fix, Origin, SourceMap};
 use crate::ir::{Assembly, Design};
@@ -105,6 +108,8 @@ pub struct Options {
     pub set: Vec<(String, String)>,
     /// `--steps`: number of steps in place of the text's.
     pub steps: Option<usize>,
+    /// `--variant`: the variant that is built; none: the design as it stands.
+    pub variant: Option<String>,
 }
 
 /// What [`elaborate`] gives.
@@ -114,6 +119,8 @@ pub struct Elaborated {
     pub assembly: Option<Assembly>,
     /// Its design, if it is one mechanism that places no others.
     pub design: Option<Design>,
+    /// Names of the variants of what the file builds.
+    pub variants: Vec<String>,
     /// Every text that was read: the root file first, then imports, then `--set` values.
     pub sources: SourceMap,
     /// The design's own files as understood, the root file first.
@@ -141,7 +148,14 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
     let program = load::load(root, files, &mut sources, &mut diagnostics);
     let settings = Settings::parse(&options.set, &mut sources, &mut diagnostics);
     let Some(module) = program.root.and_then(|i| Some((i, program.modules.get(i)?))) else {
-        return Elaborated { assembly: None, design: None, sources, files: Vec::new(), diagnostics };
+        return Elaborated {
+            assembly: None,
+            design: None,
+            variants: Vec::new(),
+            sources,
+            files: Vec::new(),
+            diagnostics,
+        };
     };
     let (root_index, root_module) = module;
     let outside = mechanism::Outside { module: root_index, steps: options.steps, sources: &sources, files };
@@ -149,19 +163,25 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
     let (mut assembly, mut used) = (None, std::collections::BTreeSet::new());
     let no_settings = Settings::default();
     let (built, others) = roles(&program, root_index);
+    let variants = built.map(|m| variants::of(m, &mut diagnostics)).unwrap_or_default();
+    let chosen = options.variant.as_deref().and_then(|n| variants.iter().find(|v| v.name.node == n));
+    if let (Some(name), None, Some(m)) = (&options.variant, chosen, built) {
+        diagnostics.push(variants::missing(name, &variants, m));
+    }
+    let own_settings = chosen.map(|v| variants::settings(v, &settings));
     for (m, is_root) in others.into_iter().map(|m| (m, false)).chain(built.map(|m| (m, true))) {
-        let settings = if is_root { &settings } else { &no_settings };
-        let mut found = if instances::is_assembly(m) {
-            instances::assemble(&program, settings, m, &outside, is_root)
-        } else {
-            let mut evaluator = eval::Evaluator::new(&program, settings);
-            let design = evaluator.mechanism(m, &outside);
-            if is_root {
-                evaluator.unused_settings();
+        let settings = if is_root { own_settings.as_ref().unwrap_or(&settings) } else { &no_settings };
+        let mut found = elaborated(&program, settings, m, &outside, is_root);
+        // Of a design that is right as it stands, the variants must be right too.
+        if is_root && chosen.is_none() && found.assembly.is_some() {
+            for variant in &variants {
+                let settings = variants::settings(variant, settings);
+                let mut other = elaborated(&program, &settings, m, &outside, true);
+                found.used.append(&mut other.used);
+                let new = other.out.into_iter().filter(|d| !found.out.contains(d)).collect::<Vec<_>>();
+                found.out.extend(new.into_iter().map(|d| d.also(variant.name.at, "in this variant")));
             }
-            let (out, used) = (evaluator.out, evaluator.used);
-            instances::Assembled { assembly: design.map(Assembly::of), out, used }
-        };
+        }
         used.append(&mut found.used);
         diagnostics.append(&mut found.out);
         if is_root {
@@ -193,18 +213,39 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
     }
     tidy(&mut diagnostics);
     let design = assembly.as_ref().and_then(Assembly::single).cloned();
+    let variants = variants.iter().map(|v| v.name.node.clone()).collect();
     let mut files: Vec<OwnFile> = Vec::new();
     for module in program.modules.into_iter().filter(|m| !m.path.starts_with(load::STANDARD)) {
         files.push(OwnFile { id: module.file_id, path: module.path, ast: module.file });
     }
     files.sort_by_key(|f| f.id);
-    Elaborated { assembly, design, sources, files, diagnostics }
+    Elaborated { assembly, design, variants, sources, files, diagnostics }
 }
 
 /// The repair that takes a statement out.
 fn removal(sources: &SourceMap, at: Origin) -> Fix {
     let text = sources.files.get(at.file as usize).map_or("", |f| f.text.as_str());
     Fix::safe("remove it", vec![Edit::remove(text, at)])
+}
+
+/// One mechanism, with what is set of it.
+fn elaborated(
+    program: &load::Program,
+    settings: &Settings,
+    m: &Mechanism,
+    outside: &mechanism::Outside<'_>,
+    is_root: bool,
+) -> instances::Assembled {
+    if instances::is_assembly(m) {
+        return instances::assemble(program, settings, m, outside, is_root);
+    }
+    let mut evaluator = eval::Evaluator::new(program, settings);
+    let design = evaluator.mechanism(m, outside);
+    if is_root {
+        evaluator.unused_settings();
+    }
+    let (out, used) = (evaluator.out, evaluator.used);
+    instances::Assembled { assembly: design.map(Assembly::of), out, used }
 }
 
 /// What a file builds, and the mechanisms that have to be checked by themselves because it does not place them.

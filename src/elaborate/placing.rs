@@ -4,7 +4,7 @@ use super::codes;
 use super::load::Program;
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::ir::Placement;
-use crate::syntax::ast::{Ident, Item, Mechanism, StatementKind};
+use crate::syntax::ast::{Ident, Item, Mechanism, Statement, StatementKind};
 use nalgebra::{Rotation3, Unit, Vector3};
 
 /// Sines and cosines this near to 0 and ±1 are exact: quarter turns keep flat faces flat.
@@ -18,18 +18,26 @@ pub fn placement(at: [f64; 3], angle_rad: f64, axis: [f64; 3]) -> Placement {
 }
 
 /// The mechanisms that a mechanism places, with the place of each name.
-fn places(m: &Mechanism) -> impl Iterator<Item = &Ident> {
-    m.statements.iter().filter_map(|s| match &s.kind {
-        StatementKind::Place(p) => Some(&p.mechanism),
-        _ => None,
-    })
+fn places(m: &Mechanism) -> Vec<&Ident> {
+    fn collect<'m>(statements: &'m [Statement], into: &mut Vec<&'m Ident>) {
+        for s in statements {
+            match &s.kind {
+                StatementKind::Place(p) => into.push(&p.mechanism),
+                StatementKind::For(f) => collect(&f.statements, into),
+                _ => {}
+            }
+        }
+    }
+    let mut found = Vec::new();
+    collect(&m.statements, &mut found);
+    found
 }
 
 /// Items that the mechanism at `item` places.
 pub fn placed_by(program: &Program, item: (usize, usize)) -> Vec<((usize, usize), Origin)> {
     let Some(Item::Mechanism(m)) = program.item(item) else { return Vec::new() };
     let Some(module) = program.modules.get(item.0) else { return Vec::new() };
-    places(m).filter_map(|name| Some((module.names.get(&name.node)?.item, name.at))).collect()
+    places(m).into_iter().filter_map(|name| Some((module.names.get(&name.node)?.item, name.at))).collect()
 }
 
 /// A circle that can be reached from `item`: its members in order, each with the place of the name that leads to

@@ -4,7 +4,7 @@
 use super::sheet::DriveText;
 use crate::diagnostic::Origin;
 use crate::syntax::ast::{self, Argument, Expr, ExprKind, Ident, Mechanism, StatementKind};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A statement without the instances' names in it.
 pub struct Query<T> {
@@ -14,6 +14,8 @@ pub struct Query<T> {
     pub text: T,
     /// The whole statement.
     pub at: Origin,
+    /// Of a repeated one, in which turn: ` (i = 2)`.
+    pub turn: String,
 }
 
 /// `require` and `export` statements of an assembly.
@@ -26,7 +28,8 @@ pub struct Queries {
 
 impl Queries {
     /// Those of a mechanism that places others.
-    pub fn of(m: &Mechanism) -> Self {
+    /// `turns` tells repeated statements apart, by their index.
+    pub fn of(m: &Mechanism, turns: &BTreeMap<usize, String>) -> Self {
         let names: BTreeSet<&str> = m
             .statements
             .iter()
@@ -37,18 +40,19 @@ impl Queries {
             })
             .collect();
         let mut out = Self { requires: Vec::new(), exports: Vec::new() };
-        for s in &m.statements {
+        for (k, s) in m.statements.iter().enumerate() {
+            let turn = turns.get(&k).cloned().unwrap_or_default();
             match &s.kind {
                 StatementKind::Require { left, op, right } => {
                     let mut found = Vec::new();
                     let text =
                         (stripped(left, &names, &mut found), op.node, stripped(right, &names, &mut found));
-                    out.requires.push(Query { instances: found, text, at: s.at });
+                    out.requires.push(Query { instances: found, text, at: s.at, turn });
                 }
                 StatementKind::Export(list) => out.exports.extend(list.iter().map(|e| {
                     let mut found = Vec::new();
                     let text = stripped(e, &names, &mut found);
-                    Query { instances: found, text, at: e.at }
+                    Query { instances: found, text, at: e.at, turn: turn.clone() }
                 })),
                 _ => {}
             }

@@ -14,6 +14,13 @@ pub struct Setting {
     pub at: Origin,
 }
 
+impl Setting {
+    /// The same once more.
+    pub fn again(&self) -> Self {
+        Self { path: self.path.clone(), value: self.value.clone(), at: self.at }
+    }
+}
+
 /// All of them, in order.
 #[derive(Default)]
 pub struct Settings(pub Vec<Setting>);

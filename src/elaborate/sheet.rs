@@ -63,6 +63,7 @@ pub struct Sheet<'a> {
     pub minimize: Option<(&'a [ast::Term], Origin)>,
     pub requires: Vec<RequireText<'a>>,
     pub exports: Vec<&'a Expr>,
+    pub asserts: Vec<(&'a ast::Assert, Origin)>,
     pub places: Vec<(&'a ast::Place, Origin)>,
     pub mirrors: Vec<(&'a ast::Mirror, Origin)>,
     /// Something could not be understood: what seems missing may be there.
@@ -212,6 +213,9 @@ impl<'a> Evaluator<'a> {
                     sheet.mirrors.push((mirror, at));
                 }
             }
+            StatementKind::Assert(assert) => sheet.asserts.push((assert, at)),
+            // Variants are set from outside; what is repeated has been written out.
+            StatementKind::Variant(_) | StatementKind::For(_) => {}
             StatementKind::Rod(_) | StatementKind::OwnBody { .. } => self.out.push(
                 Diagnostic::error(codes::MISPLACED, "this stands in a `flexure`, not in a mechanism", at)
                     .help("declare `flexure NAME replaces hinge { … }` and use it with `as NAME`"),

@@ -304,7 +304,8 @@ pub fn driven(assembly: &Assembly, export: &AssemblyExport, drive: usize) -> Opt
     let instance = assembly.instances.get(export.instance?)?;
     let mut design = assembly.designs.get(instance.design)?.clone();
     if assembly.single().is_none() {
-        design.name = format!("{}_{}", assembly.name, instance.name);
+        // `finger[2]` is no name for a file.
+        design.name = format!("{}_{}", assembly.name, instance.name.replace('[', "-").replace(']', ""));
         if instance.drives.get(drive)?.sign < 0.0 {
             let turned = design.drives.get_mut(drive)?;
             turned.reverse(&mut design.exprs);

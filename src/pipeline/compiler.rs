@@ -51,11 +51,13 @@ impl Stages for Compiler {
         source: &str,
         overrides: &[(String, String)],
         steps: Option<usize>,
+        variant: Option<&str>,
         files: &dyn Files,
     ) -> Checked {
-        let options = Options { set: overrides.to_vec(), steps };
+        let options = Options { set: overrides.to_vec(), steps, variant: variant.map(String::from) };
         let out = elaborate(source, files, &options);
-        Checked { sources: out.sources, assembly: out.assembly, diagnostics: out.diagnostics }
+        let (sources, assembly, variants) = (out.sources, out.assembly, out.variants);
+        Checked { sources, assembly, variants, diagnostics: out.diagnostics }
     }
 
     fn rigid(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {

@@ -20,6 +20,17 @@ pub enum Values<'a> {
     Solve(&'a dyn Progress, &'a AtomicBool),
 }
 
+/// How far to go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Extent {
+    /// The values only: nothing is simulated.
+    Values,
+    /// Simulated and measured.
+    Measures,
+    /// The printed parts are made as well, to weigh them.
+    Volume,
+}
+
 /// What was found.
 #[derive(Clone, Debug, Default)]
 pub struct Examined {
@@ -34,16 +45,16 @@ pub struct Examined {
     pub volume_mm3: Option<f64>,
 }
 
-/// Reads, simulates and measures a design; with `volume` its printed parts are made too, to weigh them.
+/// Reads a design, and simulates and measures it as far as is wanted.
 pub fn examine(
     request: &Request,
     from: Values,
-    volume: bool,
+    extent: Extent,
     stages: &dyn Stages,
     files: &dyn Files,
 ) -> Examined {
     let mut found = Examined::default();
-    run(request, from, volume, stages, files, &mut found);
+    run(request, from, extent, stages, files, &mut found);
     found
 }
 
@@ -51,7 +62,7 @@ pub fn examine(
 fn run(
     request: &Request,
     from: Values,
-    volume: bool,
+    extent: Extent,
     stages: &dyn Stages,
     files: &dyn Files,
     found: &mut Examined,
@@ -78,6 +89,9 @@ fn run(
             (assembly.designs.iter().zip(&locked).map(values).collect(), origins)
         }
     };
+    if extent < Extent::Measures {
+        return Some(());
+    }
     let pairs = || assembly.designs.iter().zip(&found.values);
     let simulations =
         pairs().map(|(d, v)| stages.simulate(d, v)).collect::<Result<Vec<Simulation>, Failed>>();
@@ -88,7 +102,7 @@ fn run(
     let placed = assembly::place(&assembly, &simulations);
     out.after = Some(assembly::measure_all(&assembly, &placed, &between));
     out.requirements = assembly::check_all(&assembly, &simulations, &placed, &between, &mut out.diagnostics);
-    if volume && assembly.exports.iter().any(|e| e.export.kind == ExportKind::Stl) {
+    if extent >= Extent::Volume && assembly.exports.iter().any(|e| e.export.kind == ExportKind::Stl) {
         // What cannot be printed is no finding here: a build tells it.
         let parts = stages.parts(&assembly, &found.values).ok();
         found.volume_mm3 = parts.map(|(parts, _)| parts.iter().map(|p| volume_mm3(&p.bytes)).sum());

@@ -96,6 +96,8 @@ pub fn parts(assembly: &Assembly, solids: &[Solid]) -> Result<(Vec<Printed>, Vec
     let (mut out, mut found) = (Vec::new(), Vec::new());
     for group in whole.groups() {
         let Some((name, at)) = name(assembly, solids, &whole, &group) else { continue };
+        // Repeated instances are named with brackets, which shells and some slicers take for patterns.
+        let name = name.replace('[', "-").replace(']', "");
         let (pieces, links) = match alone(assembly, solids, &whole, &group) {
             Some((mesh, links)) => (vec![mesh], links),
             None => whole.build(&group).map_err(failed(&name, at))?,

@@ -20,7 +20,7 @@ mod stages;
 
 pub use aims::{AimSeries, DirectionMeasures, OutputMeasures};
 pub use compiler::{Compiler, EDGES};
-pub use examine::{Examined, Values, examine};
+pub use examine::{Examined, Extent, Values, examine};
 pub use manifest::COMPILER;
 pub use measure::{aggregate, check_requirements, is_closed, measure};
 pub use progress::{Iteration, Progress, Stage};
@@ -47,6 +47,8 @@ pub struct Request {
     pub overrides: Vec<(String, String)>,
     /// `--steps`.
     pub steps: Option<usize>,
+    /// `--variant`.
+    pub variant: Option<String>,
     /// The lock as it stands: its name and text.
     pub lock: Option<(String, String)>,
     /// Ignore the lock, and what has been made before.
@@ -232,8 +234,10 @@ fn front_end(
     files: &dyn Files,
     out: &mut BuildOutcome,
 ) -> Option<Assembly> {
-    let checked = stages.check(&request.source, &request.overrides, request.steps, files);
+    let checked =
+        stages.check(&request.source, &request.overrides, request.steps, request.variant.as_deref(), files);
     out.sources = checked.sources;
+    out.variants = checked.variants;
     out.diagnostics.extend(checked.diagnostics);
     if out.diagnostics.iter().any(Diagnostic::is_error) {
         return None;

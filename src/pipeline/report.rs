@@ -210,6 +210,8 @@ pub struct BuildOutcome {
     pub diagnostics: Vec<Diagnostic>,
     /// What is built.
     pub assembly: Option<Assembly>,
+    /// Names of its variants.
+    pub variants: Vec<String>,
     /// Its design, if it is one mechanism that places no others.
     pub design: Option<Design>,
     /// The solved values.

@@ -21,6 +21,8 @@ pub struct Checked {
     pub sources: SourceMap,
     /// What is to be built, if there were no errors.
     pub assembly: Option<Assembly>,
+    /// Names of its variants.
+    pub variants: Vec<String>,
     /// Findings.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -85,12 +87,14 @@ impl Made for NothingMade {
 
 /// The stages. `values` are the free variables in the design's order.
 pub trait Stages {
-    /// Text to design. `overrides` are `--set` names and expressions; `steps` overrides the cycle's.
+    /// Text to design. `overrides` are `--set` names and expressions; `steps` overrides the cycle's; without a `variant`
+    /// it is the design as it stands.
     fn check(
         &self,
         source: &str,
         overrides: &[(String, String)],
         steps: Option<usize>,
+        variant: Option<&str>,
         files: &dyn Files,
     ) -> Checked;
 

@@ -105,7 +105,14 @@ pub(super) struct Toy {
 }
 
 impl Stages for Toy {
-    fn check(&self, source: &str, _: &[(String, String)], steps: Option<usize>, _: &dyn Files) -> Checked {
+    fn check(
+        &self,
+        source: &str,
+        _: &[(String, String)],
+        steps: Option<usize>,
+        _: Option<&str>,
+        _: &dyn Files,
+    ) -> Checked {
         let mut design = design();
         design.cycle.steps = steps.unwrap_or(design.cycle.steps);
         if let Some(change) = self.change {

@@ -247,6 +247,12 @@ pub enum StatementKind {
     Place(Box<Place>),
     /// `mirror NAME = INSTANCE across yz [sharing BODY, …]`
     Mirror(Box<Mirror>),
+    /// `assert EXPR <= EXPR "message"`
+    Assert(Box<Assert>),
+    /// `variant NAME { PATH = EXPR, … }`
+    Variant(Box<Variant>),
+    /// `for NAME in A .. B { … }`: repeats instances
+    For(Box<For>),
     /// `body NAME`: a body that a template brings along (templates only)
     OwnBody {
         /// Name.
@@ -350,7 +356,7 @@ pub struct TemplateUse {
 /// A mechanism put somewhere.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Place {
-    /// Name of the instance.
+    /// Name of the instance, with its index as written without spaces: `finger[i+1]`.
     pub name: Ident,
     /// The mechanism.
     pub mechanism: Ident,
@@ -364,6 +370,41 @@ pub struct Place {
     pub scale: Option<Expr>,
     /// `merging GROUND into BODY`, each.
     pub merging: Vec<(Ident, Ident)>,
+}
+
+/// What must hold of a design's own numbers, before anything is solved.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Assert {
+    /// Left side.
+    pub left: Expr,
+    /// Comparison.
+    pub op: At<Compare>,
+    /// Right side.
+    pub right: Expr,
+    /// What to say where it does not hold.
+    pub message: At<String>,
+}
+
+/// The same design with other parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variant {
+    /// Name.
+    pub name: Ident,
+    /// What is set to what, as by `--set`: `r`, `knee.thickness`.
+    pub settings: Vec<(Ident, Expr)>,
+}
+
+/// Statements that are repeated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct For {
+    /// The number that runs.
+    pub variable: Ident,
+    /// Its first value.
+    pub first: Expr,
+    /// Its last value.
+    pub last: Expr,
+    /// `place`, `mirror`, `require`, `export`, `for`.
+    pub statements: Vec<Statement>,
 }
 
 /// The mirror image of an instance.
@@ -468,7 +509,7 @@ pub enum ExprKind {
         /// Factors of the unit in order: (`mm`, 1), (`cm`, -3) …; empty for a bare number.
         unit: Vec<UnitFactor>,
     },
-    /// `r`, `rigur.strength`.
+    /// `r`, `rigur.strength`, `finger[2].tip` (a part with its index, written without spaces).
     Name(Vec<Ident>),
     /// `"text"`.
     Text(String),

@@ -101,7 +101,7 @@ impl Lower<'_> {
                 }
                 (Expr { kind: ExprKind::Call { function, arguments }, at }, depth + 1)
             }
-            Kind::Name => (Expr { kind: ExprKind::Name(self.idents(node)), at }, 1),
+            Kind::Name => (Expr { kind: ExprKind::Name(self.indexed(node)), at }, 1),
             Kind::Text => (Expr { kind: ExprKind::Text(self.quoted(node)), at }, 1),
             Kind::Number => (self.number(node), 1),
             Kind::Exponent => {

@@ -103,6 +103,8 @@ fn is_weak(rule: Rule) -> bool {
             | Rule::unit_power
             | Rule::dot
             | Rule::lparen
+            | Rule::lbracket
+            | Rule::index
             | Rule::kw_about
             | Rule::kw_direction
     )
@@ -134,6 +136,9 @@ fn words(rule: Rule) -> String {
         Rule::rbrace | Rule::no_brace => "`}`",
         Rule::lparen | Rule::tuple => "`(`",
         Rule::rparen => "`)`",
+        Rule::lbracket | Rule::index => "`[`",
+        Rule::rbracket => "`]`",
+        Rule::setting => "`name = value`",
         Rule::dot => "`.`",
         Rule::range => "`..`",
         Rule::caret => "`^`",
@@ -309,6 +314,11 @@ fn kind(rule: Rule) -> Kind {
         Rule::load_gravity => Kind::Gravity,
         Rule::load_moment => Kind::Moment,
         Rule::load_force => Kind::Force,
+        Rule::index => Kind::Index,
+        Rule::st_assert => Kind::Assert,
+        Rule::st_variant => Kind::Variant,
+        Rule::setting => Kind::Setting,
+        Rule::st_for => Kind::For,
         Rule::st_later => Kind::Later,
         Rule::value => Kind::Value,
         Rule::free => Kind::Free,
@@ -340,6 +350,8 @@ fn kind(rule: Rule) -> Kind {
         | Rule::rbrace
         | Rule::lparen
         | Rule::rparen
+        | Rule::lbracket
+        | Rule::rbracket
         | Rule::dot
         | Rule::range
         | Rule::add_op

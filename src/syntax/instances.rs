@@ -1,13 +1,13 @@
-//! `place` and `mirror`: concrete tree to [`ast::Place`] and [`ast::Mirror`].
+//! `place`, `mirror`, `for`, `variant` and `assert`: concrete tree to their views in [`ast`](super::ast).
 
-use super::ast::{Mirror, Place};
+use super::ast::{Assert, At, For, Mirror, Place, StatementKind, Variant};
 use super::lower::Lower;
 use super::tree::{Kind, Node};
-use crate::diagnostic::Origin;
+use crate::diagnostic::{Diagnostic, Origin};
 
 impl Lower<'_> {
     pub(super) fn place(&mut self, node: &Node) -> Option<Place> {
-        let mut names = self.idents(node).into_iter();
+        let mut names = self.indexed(node).into_iter();
         let (name, mechanism) = (names.next()?, names.next()?);
         let point = self.value(node)?;
         let overrides = self.overrides(node);
@@ -41,9 +41,56 @@ impl Lower<'_> {
     }
 
     pub(super) fn mirror(&mut self, node: &Node) -> Option<Mirror> {
-        let mut names = self.idents(node).into_iter();
+        let mut names = self.indexed(node).into_iter();
         let (name, of, plane) = (names.next()?, names.next()?, names.next()?);
         let sharing = node.first(Kind::Sharing).map(|n| self.idents(n)).unwrap_or_default();
         Some(Mirror { name, of, plane, sharing })
+    }
+
+    pub(super) fn assertion(&mut self, node: &Node) -> Option<Assert> {
+        let mut values = self.values(node).into_iter();
+        let (left, right) = (values.next()?, values.next()?);
+        let text = node.first(Kind::Text)?;
+        let message = At { node: self.quoted(text), at: self.origin(text) };
+        Some(Assert { left, op: self.comparison(node)?, right, message })
+    }
+
+    pub(super) fn variant(&mut self, node: &Node) -> Option<Variant> {
+        let name = self.ident(node)?;
+        let mut settings = Vec::new();
+        for setting in node.all(Kind::Setting) {
+            let names = self.idents(setting);
+            let (first, last) = (names.first()?, names.last()?);
+            let at = Origin { end: last.at.end, ..first.at };
+            let path: Vec<&str> = names.iter().map(|n| n.node.as_str()).collect();
+            settings.push((At { node: path.join("."), at }, self.value(setting)?));
+        }
+        Some(Variant { name, settings })
+    }
+
+    pub(super) fn repeated(&mut self, node: &Node) -> Option<For> {
+        let variable = self.ident(node)?;
+        let mut values = self.values(node).into_iter();
+        let (first, last) = (values.next()?, values.next()?);
+        let mut statements = self.statements(node);
+        for s in &mut statements {
+            if !matches!(
+                s.kind,
+                StatementKind::Place(_)
+                    | StatementKind::Mirror(_)
+                    | StatementKind::Require { .. }
+                    | StatementKind::Export(_)
+                    | StatementKind::For(_)
+                    | StatementKind::Later { .. }
+                    | StatementKind::Broken { .. }
+            ) {
+                self.report(
+                    Diagnostic::error("E0009", "this statement cannot be repeated", s.at)
+                        .help("a `for` holds `place`, `mirror`, `require`, `export` and further `for`s"),
+                );
+                s.kind = StatementKind::Broken { words: Vec::new() };
+            }
+        }
+        Some(For { variable, first, last, statements })
     }
 }

@@ -59,6 +59,22 @@ impl<'a> Lower<'a> {
         node.all(Kind::Ident).map(|n| self.named(n)).collect()
     }
 
+    /// All names directly in a node, each with its index as written without spaces.
+    pub(super) fn indexed(&self, node: &Node) -> Vec<Ident> {
+        let mut names: Vec<Ident> = Vec::new();
+        for part in &node.children {
+            match (part.kind, names.last_mut()) {
+                (Kind::Ident, _) => names.push(self.named(part)),
+                (Kind::Index, Some(name)) => {
+                    name.node.extend(self.text(part).chars().filter(|c| !c.is_whitespace()));
+                    name.at.end = part.end;
+                }
+                _ => {}
+            }
+        }
+        names
+    }
+
     /// First value directly in a node.
     pub(super) fn value(&mut self, node: &Node) -> Option<Expr> {
         node.first(Kind::Value).map(|n| self.expr(n))
@@ -156,13 +172,13 @@ impl<'a> Lower<'a> {
     }
 
     /// The statements directly in a block.
-    fn statements(&mut self, block: &Node) -> Vec<Statement> {
+    pub(super) fn statements(&mut self, block: &Node) -> Vec<Statement> {
         let mut statements = Vec::new();
         let mut doc = Doc::default();
         let mut inside = false;
         for node in &block.children {
             // Docs before the `{` belong to nothing in here.
-            inside |= node.kind == Kind::Punctuation;
+            inside |= node.kind == Kind::Punctuation && self.text(node) == "{";
             if !inside || doc.takes(self.text(node), node.kind) {
                 continue;
             }

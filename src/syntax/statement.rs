@@ -83,6 +83,9 @@ impl Lower<'_> {
             Kind::String => StatementKind::String(Box::new(self.string(node)?)),
             Kind::Load => StatementKind::Load(Box::new(self.load(node)?)),
             Kind::Allow => StatementKind::Allow(self.allow(node)?),
+            Kind::Assert => StatementKind::Assert(Box::new(self.assertion(node)?)),
+            Kind::Variant => StatementKind::Variant(Box::new(self.variant(node)?)),
+            Kind::For => StatementKind::For(Box::new(self.repeated(node)?)),
             Kind::Later => StatementKind::Later { keyword: self.named(node.first(Kind::Keyword)?) },
             _ => return None,
         })
@@ -206,6 +209,11 @@ impl Lower<'_> {
 
     fn require(&mut self, node: &Node) -> Option<StatementKind> {
         let mut values = self.values(node).into_iter();
+        let op = self.comparison(node)?;
+        Some(StatementKind::Require { left: values.next()?, op, right: values.next()? })
+    }
+
+    pub(super) fn comparison(&self, node: &Node) -> Option<At<Compare>> {
         let sign = node.first(Kind::Punctuation)?;
         let op = match self.text(sign) {
             "<=" => Compare::LessEqual,
@@ -213,8 +221,7 @@ impl Lower<'_> {
             ">=" => Compare::GreaterEqual,
             _ => Compare::Greater,
         };
-        let op = At { node: op, at: self.origin(sign) };
-        Some(StatementKind::Require { left: values.next()?, op, right: values.next()? })
+        Some(At { node: op, at: self.origin(sign) })
     }
 
     fn string(&mut self, node: &Node) -> Option<Cable> {

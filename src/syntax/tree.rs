@@ -98,6 +98,11 @@ pub enum Kind {
     Gravity,
     Moment,
     Force,
+    Index,
+    Assert,
+    Variant,
+    Setting,
+    For,
     Later,
     // items
     File,
