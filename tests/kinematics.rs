@@ -46,7 +46,12 @@ impl Builder {
                 strain_once: None,
                 strain_repeated: None,
             },
-            process: Process { name: "p".into(), least_wall_mm: 0.6, clearance_mm: 0.5 },
+            process: Process {
+                name: "p".into(),
+                least_wall_mm: 0.6,
+                clearance_mm: 0.5,
+                printing: Default::default(),
+            },
             layers: Layers { height_mm: 5.0, pitch_mm: 5.5, axis: [0.0, 0.0, 1.0] },
             exports: Vec::new(),
             origin: origin(9, 9),

@@ -21,26 +21,6 @@ pub const FAILED: u8 = 1;
 /// Exit code after a second Ctrl-C, as shells have it for SIGINT.
 const INTERRUPTED: i32 = 130;
 
-/// `flexura check`.
-pub fn check(common: &Common) -> u8 {
-    let opened = match open(common) {
-        Ok(opened) => opened,
-        Err(why) => return unreadable(common, &why),
-    };
-    let mut out = pipeline::check(&opened.request, &Compiler::default(), &opened.folder);
-    opened.name_as_written(&mut out.sources);
-    render::report(&out.diagnostics, &out.sources, common.format);
-    if common.format == Format::Human {
-        match (&out.assembly, render::counts(&out.diagnostics)) {
-            (Some(assembly), counts) if counts.is_empty() => {
-                print(&format!("{}: no errors\n", assembly.name));
-            }
-            (_, counts) => tell(&format!("{}: {counts}\n", common.source.display())),
-        }
-    }
-    code(&out)
-}
-
 /// `flexura ir`.
 pub fn ir(common: &Common) -> u8 {
     let opened = match open(common) {
@@ -127,6 +107,17 @@ pub fn build(arguments: &Build) -> u8 {
     opened.request.fresh = arguments.fresh;
     opened.request.resume = arguments.resume;
     opened.request.frozen = arguments.frozen;
+    match arguments.lints.levels(opened.folder.root()) {
+        Ok(levels) => opened.request.levels = levels,
+        Err(stopped) => {
+            let out = BuildOutcome {
+                diagnostics: stopped.diagnostics,
+                sources: stopped.sources,
+                ..BuildOutcome::default()
+            };
+            return finish_build(out, common.format, &[]);
+        }
+    }
     let lock_path = match opened.read_lock(common, &arguments.out) {
         Ok(path) => path,
         Err(why) => return finish_build(unopened(&why), common.format, &[]),
@@ -194,7 +185,8 @@ fn write(out: &BuildOutcome, folder: &Path, lock_path: &Path) -> Result<Vec<(Str
     Ok(written)
 }
 
-fn code(out: &BuildOutcome) -> u8 {
+/// The exit code of an outcome.
+pub fn code(out: &BuildOutcome) -> u8 {
     if out.failed() { FAILED } else { FINE }
 }
 
@@ -224,14 +216,17 @@ fn stop_on_ctrl_c(say: impl Fn() + Send + 'static) -> Arc<AtomicBool> {
 }
 
 /// A source and the folder it stands in.
-struct Opened {
-    folder: Folder,
-    request: Request,
+pub struct Opened {
+    /// The folder.
+    pub folder: Folder,
+    /// What is asked for.
+    pub request: Request,
     /// Folder as the user wrote it, for messages and for the lock.
     shown: PathBuf,
 }
 
-fn open(common: &Common) -> Result<Opened, (PathBuf, FileError)> {
+/// The design of a command.
+pub fn open(common: &Common) -> Result<Opened, (PathBuf, FileError)> {
     let fail = |e| (common.source.clone(), e);
     let (folder, source) = Folder::of(&common.source).map_err(fail)?;
     // Read once here so that an unreadable source is told from an unreadable import.
@@ -251,7 +246,7 @@ fn open(common: &Common) -> Result<Opened, (PathBuf, FileError)> {
 
 impl Opened {
     /// Gives the design's files the names by which the user can reach them: editors jump to these.
-    fn name_as_written(&self, sources: &mut SourceMap) {
+    pub fn name_as_written(&self, sources: &mut SourceMap) {
         for file in &mut sources.files {
             if file.name.ends_with(".mech") && !file.name.starts_with("std/") {
                 file.name = self.shown.join(&file.name).display().to_string();
@@ -260,7 +255,7 @@ impl Opened {
     }
 
     /// Reads the lock, if there is one; returns where it belongs.
-    fn read_lock(&mut self, common: &Common, out: &Path) -> Result<PathBuf, (PathBuf, FileError)> {
+    pub fn read_lock(&mut self, common: &Common, out: &Path) -> Result<PathBuf, (PathBuf, FileError)> {
         let stem = self.request.source.strip_suffix(".mech").unwrap_or(&self.request.source);
         let name = format!("{stem}.lock");
         let tried_out = !common.overrides.is_empty() || common.steps.is_some();
@@ -275,7 +270,8 @@ impl Opened {
     }
 }
 
-fn unreadable(common: &Common, why: &(PathBuf, FileError)) -> u8 {
+/// Tells that a file could not be read.
+pub fn unreadable(common: &Common, why: &(PathBuf, FileError)) -> u8 {
     render::report(&unopened(why).diagnostics, &SourceMap::default(), common.format);
     FAILED
 }

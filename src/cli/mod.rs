@@ -2,8 +2,11 @@
 //! threads) lives in this folder.
 
 mod artefacts;
+mod check;
 mod commands;
+mod explain;
 mod human;
+mod lints;
 mod progress;
 mod released;
 mod render;
@@ -27,7 +30,10 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Read a design and say what is wrong with it
-    Check(Common),
+    ///
+    /// With a current lock beside the design, its solution is looked at too. Findings are silenced where they are
+    /// known: `allow CODE "reason"` in the text, a flexura.toml, the flags below. `flexura explain CODE` tells of each.
+    Check(check::Check),
     /// Solve a design and write its parts and sketches
     ///
     /// The solved values go into NAME.lock beside the source; with --set or --steps it goes into the
@@ -42,6 +48,8 @@ enum Command {
     Simulate(Simulate),
     /// Print the elaborated design as JSON
     Ir(Common),
+    /// Tell what a finding means, why it matters and what to do
+    Explain(explain::Explain),
 }
 
 /// What every command takes.
@@ -75,6 +83,8 @@ enum Format {
 struct Build {
     #[command(flatten)]
     common: Common,
+    #[command(flatten)]
+    lints: lints::LintFlags,
     /// Folder for everything that is made
     #[arg(long, value_name = "FOLDER", default_value = "out")]
     out: PathBuf,
@@ -146,15 +156,18 @@ struct Simulate {
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let threads = match &cli.command {
-        Command::Check(common) | Command::Ir(common) => common.threads,
+        Command::Check(check) => check.common.threads,
+        Command::Explain(_) => None,
+        Command::Ir(common) => common.threads,
         Command::Build(build) => build.common.threads,
         Command::Simulate(simulate) => simulate.common.threads,
     };
     let run = || match &cli.command {
-        Command::Check(common) => commands::check(common),
+        Command::Check(arguments) => check::check(arguments),
         Command::Build(arguments) => commands::build(arguments),
         Command::Simulate(arguments) => commands::simulate(arguments),
         Command::Ir(common) => commands::ir(common),
+        Command::Explain(arguments) => explain::explain(arguments),
     };
     let code = match threads {
         None => run(),

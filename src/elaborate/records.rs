@@ -8,7 +8,7 @@ use super::scope::{Key, State};
 use super::units::GRAMS_PER_TONNE;
 use super::value::{ItemRef, Value};
 use crate::diagnostic::{Diagnostic, Origin};
-use crate::ir::{Material, Motor, MotorInterface, Process};
+use crate::ir::{Material, Motor, MotorInterface, Printing, Process};
 use crate::syntax::ast::{Ident, Item, Record};
 
 /// What a field holds.
@@ -38,8 +38,15 @@ const MATERIAL: &[Field] = &[
     field("strain_repeated", Dimension::NUMBER, false),
 ];
 
-const PROCESS: &[Field] =
-    &[field("least_wall", Dimension::LENGTH, true), field("clearance", Dimension::LENGTH, true)];
+const PROCESS: &[Field] = &[
+    field("least_wall", Dimension::LENGTH, true),
+    field("clearance", Dimension::LENGTH, true),
+    field("bed_x", Dimension::LENGTH, false),
+    field("bed_y", Dimension::LENGTH, false),
+    field("bed_z", Dimension::LENGTH, false),
+    field("overhang", Dimension::ANGLE, false),
+    field("across_layers", Dimension::NUMBER, false),
+];
 
 const MOTOR: &[Field] = &[
     Field { name: "interface", holds: Holds::Text, required: true },
@@ -266,7 +273,26 @@ impl<'a> Evaluator<'a> {
             name: record.name.node.clone(),
             least_wall_mm: self.positive_field(item, "least_wall")?.unwrap_or_default(),
             clearance_mm: self.positive_field(item, "clearance")?.unwrap_or_default(),
+            printing: self.printing(item, record)?,
         })
+    }
+
+    fn printing(&mut self, item: ItemRef, record: &Record) -> Outcome<Printing> {
+        let names = ["bed_x", "bed_y", "bed_z"];
+        let mut sides = [None; 3];
+        for (side, name) in sides.iter_mut().zip(names) {
+            *side = self.positive_field(item, name)?;
+        }
+        let bed_mm = match sides {
+            [Some(x), Some(y), Some(z)] => Some([x, y, z]),
+            [None, None, None] => None,
+            _ => {
+                let d = Diagnostic::error(codes::RECORD, "a build volume has three sides", record.name.at);
+                return self.fail(d.help("state `bed_x`, `bed_y` and `bed_z`, or none of them"));
+            }
+        };
+        let overhang_rad = self.positive_field(item, "overhang")?;
+        Ok(Printing { bed_mm, overhang_rad, across_layers: self.positive_field(item, "across_layers")? })
     }
 
     pub(super) fn motor(&mut self, item: ItemRef) -> Outcome<Motor> {

@@ -546,6 +546,27 @@ pub struct Process {
     pub least_wall_mm: f64,
     /// Least clearance between moving parts, mm.
     pub clearance_mm: f64,
+    /// What changes no solution, but what can be printed.
+    #[serde(default, skip_serializing_if = "Printing::is_unknown")]
+    pub printing: Printing,
+}
+
+/// What a process allows beside walls and gaps; what the text does not state is absent.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Printing {
+    /// Build volume, mm.
+    pub bed_mm: Option<[f64; 3]>,
+    /// Largest angle of a face from the upright that is printed without support, rad.
+    pub overhang_rad: Option<f64>,
+    /// Strength across the layers as a part of that within them.
+    pub across_layers: Option<f64>,
+}
+
+impl Printing {
+    /// Whether nothing is stated.
+    pub fn is_unknown(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// Stacking of planar links along their common axis.

@@ -78,7 +78,12 @@ pub(super) fn design() -> Design {
             strain_once: None,
             strain_repeated: None,
         },
-        process: Process { name: "p".into(), least_wall_mm: 0.6, clearance_mm: 0.3 },
+        process: Process {
+            name: "p".into(),
+            least_wall_mm: 0.6,
+            clearance_mm: 0.3,
+            printing: Default::default(),
+        },
         layers: Layers { height_mm: 6.0, pitch_mm: 6.3, axis: [0.0, 0.0, 1.0] },
         exports: vec![
             Export { kind: ExportKind::Stl, origin },

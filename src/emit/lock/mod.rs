@@ -141,6 +141,10 @@ pub fn design_digest(design: &Design) -> String {
     if let Value::Object(fields) = &mut value {
         fields.remove("exports");
         fields.remove("requirements");
+        // What a printer can do is asked of the result.
+        if let Some(Value::Object(process)) = fields.get_mut("process") {
+            process.remove("printing");
+        }
         // Angles are only looked at.
         if let Some(Value::Object(aims)) = fields.get_mut("aims") {
             aims.remove("angles");
