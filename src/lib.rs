@@ -12,6 +12,7 @@ pub mod equilibrium;
 pub mod geometry;
 pub mod ir;
 pub mod kinematics;
+pub mod lint;
 pub mod math;
 pub mod optimize;
 pub mod pipeline;

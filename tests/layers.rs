@@ -43,6 +43,7 @@ fn each_dependency_is_seen_by_one_folder() {
         ("boolmesh", "geometry/"),
         ("minijinja", "emit/arduino/"),
         ("stl_io", "emit/"),
+        ("toml", "lint/"),
         ("clap", "cli/"),
         ("indicatif", "cli/"),
         ("ctrlc", "cli/"),

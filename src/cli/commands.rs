@@ -21,26 +21,6 @@ pub const FAILED: u8 = 1;
 /// Exit code after a second Ctrl-C, as shells have it for SIGINT.
 const INTERRUPTED: i32 = 130;
 
-/// `flexura check`.
-pub fn check(common: &Common) -> u8 {
-    let opened = match open(common) {
-        Ok(opened) => opened,
-        Err(why) => return unreadable(common, &why),
-    };
-    let mut out = pipeline::check(&opened.request, &Compiler::default(), &opened.folder);
-    opened.name_as_written(&mut out.sources);
-    render::report(&out.diagnostics, &out.sources, common.format);
-    if common.format == Format::Human {
-        match (&out.assembly, render::counts(&out.diagnostics)) {
-            (Some(assembly), counts) if counts.is_empty() => {
-                print(&format!("{}: no errors\n", assembly.name));
-            }
-            (_, counts) => tell(&format!("{}: {counts}\n", common.source.display())),
-        }
-    }
-    code(&out)
-}
-
 /// `flexura ir`.
 pub fn ir(common: &Common) -> u8 {
     let opened = match open(common) {
@@ -152,6 +132,17 @@ fn build_one(arguments: &Build, variant: Option<&str>, progress: &Terminal, canc
     opened.request.fresh = arguments.fresh;
     opened.request.resume = arguments.resume;
     opened.request.frozen = arguments.frozen;
+    match arguments.lints.levels(opened.folder.root()) {
+        Ok(levels) => opened.request.levels = levels,
+        Err(stopped) => {
+            let out = BuildOutcome {
+                diagnostics: stopped.diagnostics,
+                sources: stopped.sources,
+                ..BuildOutcome::default()
+            };
+            return (out, Vec::new());
+        }
+    }
     let lock_path = match opened.read_lock(common, &folder) {
         Ok(path) => path,
         Err(why) => return (unopened(&why), Vec::new()),
@@ -253,7 +244,8 @@ fn write(out: &BuildOutcome, folder: &Path, lock_path: &Path) -> Result<Vec<(Str
     Ok(written)
 }
 
-fn code(out: &BuildOutcome) -> u8 {
+/// The exit code of an outcome.
+pub fn code(out: &BuildOutcome) -> u8 {
     if out.failed() { FAILED } else { FINE }
 }
 
@@ -339,7 +331,8 @@ impl Opened {
     }
 }
 
-fn unreadable(common: &Common, why: &(PathBuf, FileError)) -> u8 {
+/// Tells that a file could not be read.
+pub fn unreadable(common: &Common, why: &(PathBuf, FileError)) -> u8 {
     render::report(&unopened(why).diagnostics, &SourceMap::default(), common.format);
     FAILED
 }

@@ -2,13 +2,16 @@
 //! threads) lives in this folder.
 
 mod artefacts;
+mod check;
 mod commands;
 mod diff;
 mod doc;
+mod explain;
 mod fmt;
 mod git;
 mod human;
 mod junit;
+mod lints;
 mod new;
 mod progress;
 mod released;
@@ -35,7 +38,10 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Read a design and say what is wrong with it
-    Check(Common),
+    ///
+    /// With a current lock beside the design, its solution is looked at too. Findings are silenced where they are
+    /// known: `allow CODE "reason"` in the text, a flexura.toml, the flags below. `flexura explain CODE` tells of each.
+    Check(check::Check),
     /// Solve a design and write its parts and sketches
     ///
     /// The solved values go into NAME.lock beside the source; with --set or --steps it goes into the
@@ -63,6 +69,8 @@ enum Command {
     Doc(doc::Doc),
     /// Compare two versions of a design: names, numbers, behaviour
     Diff(diff::Diff),
+    /// Tell what a finding means, why it matters and what to do
+    Explain(explain::Explain),
 }
 
 /// What every command takes.
@@ -104,6 +112,8 @@ struct Build {
     /// Build the design as it stands and all its variants, each into a folder of its name in the output folder
     #[arg(long, conflicts_with = "variant")]
     all_variants: bool,
+    #[command(flatten)]
+    lints: lints::LintFlags,
     /// Folder for everything that is made
     #[arg(long, value_name = "FOLDER", default_value = "out")]
     out: PathBuf,
@@ -175,7 +185,9 @@ struct Simulate {
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let threads = match &cli.command {
-        Command::Check(common) | Command::Ir(common) => common.threads,
+        Command::Check(check) => check.common.threads,
+        Command::Explain(_) => None,
+        Command::Ir(common) => common.threads,
         Command::Build(build) => build.common.threads,
         Command::Simulate(simulate) => simulate.common.threads,
         Command::Test(test) => test.threads,
@@ -186,7 +198,7 @@ pub fn main() -> ExitCode {
         sarif::refuse(common.format);
     }
     let run = || match &cli.command {
-        Command::Check(common) => commands::check(common),
+        Command::Check(arguments) => check::check(arguments),
         Command::Build(arguments) => commands::build(arguments),
         Command::Simulate(arguments) => commands::simulate(arguments),
         Command::Ir(common) => commands::ir(common),
@@ -195,6 +207,7 @@ pub fn main() -> ExitCode {
         Command::New(arguments) => new::run(arguments),
         Command::Doc(arguments) => doc::run(arguments),
         Command::Diff(arguments) => diff::run(arguments),
+        Command::Explain(arguments) => explain::explain(arguments),
     };
     let code = match threads {
         None => run(),

@@ -44,6 +44,7 @@ const PROCESS: &[Field] = &[
     field("layer", Dimension::LENGTH, false),
     field("line", Dimension::LENGTH, false),
     field("across", Dimension::NUMBER, false),
+    field("overhang", Dimension::ANGLE, false),
     field("bed_width", Dimension::LENGTH, false),
     field("bed_depth", Dimension::LENGTH, false),
     field("bed_height", Dimension::LENGTH, false),
@@ -289,6 +290,7 @@ impl<'a> Evaluator<'a> {
             layer_mm: self.positive_field(item, "layer")?,
             line_mm: self.positive_field(item, "line")?,
             across: self.positive_field(item, "across")?,
+            overhang_rad: self.positive_field(item, "overhang")?,
             bed_mm,
         };
         Ok(Process {

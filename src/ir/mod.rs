@@ -574,6 +574,9 @@ pub struct Machine {
     pub line_mm: Option<f64>,
     /// Strength across the layers relative to that within them.
     pub across: Option<f64>,
+    /// Largest angle of a face from the upright that is printed without support, rad.
+    #[serde(default)]
+    pub overhang_rad: Option<f64>,
     /// Room for parts: width, depth, height, mm.
     pub bed_mm: Option<[f64; 3]>,
 }

@@ -67,6 +67,8 @@ fn placed_simulation(
         errors_mm: simulation.errors_mm.iter().map(|e| series(e)).collect(),
         gaps_mm: series(&simulation.gaps_mm),
         worst: placed_worst(instance, &simulation.worst),
+        sway_mm: simulation.sway_mm.clone(),
+        conventional: None,
         aims,
         // What a motor in common would do released is not known from one half.
         stability: match instance.drives.iter().all(|d| users(assembly, d.motor) == 1) {

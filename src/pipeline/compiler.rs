@@ -14,8 +14,11 @@ use super::stages::{Between, Checked, Failed, Simulation, Solved, Stages};
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
-use crate::equilibrium::{Cycle, Equilibrium, Layout, Model, ModelError, SweepError, sweep};
+use crate::equilibrium::{
+    Cycle, Equilibrium, Layout, Model, ModelError, PointForce, Solver, SweepError, sweep,
+};
 use crate::geometry::{follows_geometry, parts_input};
+use crate::ir::expr::Node;
 use crate::ir::{Assembly, Design, DriveOn, ObjectiveKind, Solution};
 use crate::kinematics::{Constraint, Motion, solve_motion};
 use crate::math::{Pose, log_so3};
@@ -56,8 +59,13 @@ impl Stages for Compiler {
     ) -> Checked {
         let options = Options { set: overrides.to_vec(), steps, variant: variant.map(String::from) };
         let out = elaborate(source, files, &options);
-        let (sources, assembly, variants) = (out.sources, out.assembly, out.variants);
-        Checked { sources, assembly, variants, diagnostics: out.diagnostics }
+        Checked {
+            sources: out.sources,
+            assembly: out.assembly,
+            variants: out.variants,
+            files: out.files,
+            diagnostics: out.diagnostics,
+        }
     }
 
     fn rigid(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
@@ -76,7 +84,8 @@ impl Stages for Compiler {
         Ok(Simulation {
             motion: MotionTable { more: aims.columns(design), ..table(design, false, states) },
             aims,
-            diagnostics: motion.warnings,
+            diagnostics: motion.warnings.clone(),
+            conventional: Some(motion),
             ..Simulation::default()
         })
     }
@@ -86,41 +95,38 @@ impl Stages for Compiler {
         let (layout, motion) = layout(design, values)?;
         let model = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
         let cycle = sweep(&model).map_err(|e| lost(design, &e))?;
-        let states = cycle.states.iter().enumerate().map(|(s, e)| MotionState {
-            drives: layout.drives.iter().map(|d| d.values[s]).collect(),
-            traces_mm: layout.traces.iter().map(|t| e.state.poses[t.body].point(&t.rest).into()).collect(),
-            drive_loads: (0..layout.drives.len()).map(|d| e.drive_load(&model, d)).collect(),
-            energy_n_mm: e.energy_n_mm,
-            load_potential_n_mm: e.load_potential_n_mm,
-            stress_max_mpa: e.max_stress_mpa(&model),
-            poses: moving(design, |b| from_rest(&e.state.poses[b])),
-        });
-        let errors_mm = layout
-            .traces
-            .iter()
-            .enumerate()
-            .map(|(i, t)| {
-                let distance = |(e, target): (&Equilibrium, &Vector3<f64>)| {
-                    (e.state.poses[t.body].point(&t.rest) - target).norm()
-                };
-                // Without a drive the conventional mechanism stands still: that is no target.
-                let states = if design.has_target(i) { cycle.states.as_slice() } else { &[] };
-                states.iter().zip(&t.target).map(distance).collect()
-            })
-            .collect();
-        let mut diagnostics = judge(design, &layout, &cycle);
-        diagnostics.extend(news(design, &motion));
-        diagnostics.extend(slack(design, &model, &cycle));
-        let stability = stability::released(design, &layout, &model, &cycle, &mut diagnostics);
+        let mut simulation = swept(design, &layout, &model, &cycle, &motion);
+        let stability = stability::released(design, &layout, &model, &cycle, &mut simulation.diagnostics);
         let (gaps, carving) = solids::gaps(design, &layout, &model, &cycle);
-        diagnostics.extend(solids::not_carved(design, &carving));
-        diagnostics.extend(solids::collisions(design, &gaps));
-        let gaps_mm = gaps.least.iter().filter_map(|g| g.map(|g| g.gap_mm)).collect();
-        let aims = AimSeries::compliant(design, &layout, &motion, &cycle);
-        let motion = MotionTable { more: aims.columns(design), ..table(design, true, states.collect()) };
-        let worst =
-            Worst { stress: most_stressed(design, &model, &cycle), gap: solids::nearest(design, &gaps) };
-        Ok(Simulation { motion, errors_mm, aims, gaps_mm, worst, stability, diagnostics })
+        simulation.diagnostics.extend(solids::not_carved(design, &carving));
+        simulation.diagnostics.extend(solids::collisions(design, &gaps));
+        simulation.gaps_mm = gaps.least.iter().filter_map(|g| g.map(|g| g.gap_mm)).collect();
+        simulation.worst.gap = solids::nearest(design, &gaps);
+        simulation.stability = stability;
+        Ok(simulation)
+    }
+
+    fn sweep(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
+        let (layout, motion) = layout(design, values)?;
+        let model = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
+        let cycle = sweep(&model).map_err(|e| lost(design, &e))?;
+        Ok(swept(design, &layout, &model, &cycle, &motion))
+    }
+
+    fn flexure_lengths(&self, design: &Design, values: &[f64], motion: &Motion) -> Option<Vec<f64>> {
+        // How the layout changes with the design is of no interest here, and costs most of it.
+        let mut fixed = design.clone();
+        fixed.exprs.nodes = design.exprs.values(values).into_iter().map(Node::Const).collect();
+        let layout = Layout::new(&fixed, motion, values);
+        let model = Model::new(design, &layout, values, EDGES, false).ok()?;
+        Some(model.rods.iter().map(|r| r.rod.length_mm()).collect())
+    }
+
+    fn terms(&self, design: &Design, values: &[f64]) -> Vec<(String, f64)> {
+        let Ok((layout, _)) = layout(design, values) else { return Vec::new() };
+        let problem = Problem::new(design, &layout, EDGES);
+        let Some(trial) = problem.simulate(&problem.to_unit(values)) else { return Vec::new() };
+        problem.term_names().into_iter().zip(trial.terms).collect()
     }
 
     fn between(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Between {
@@ -258,6 +264,78 @@ impl Compiler {
         })
     }
 }
+
+/// What a sweep shows without printed solids.
+fn swept(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle, motion: &Motion) -> Simulation {
+    let states = cycle.states.iter().enumerate().map(|(s, e)| MotionState {
+        drives: layout.drives.iter().map(|d| d.values[s]).collect(),
+        traces_mm: layout.traces.iter().map(|t| e.state.poses[t.body].point(&t.rest).into()).collect(),
+        drive_loads: (0..layout.drives.len()).map(|d| e.drive_load(model, d)).collect(),
+        energy_n_mm: e.energy_n_mm,
+        load_potential_n_mm: e.load_potential_n_mm,
+        stress_max_mpa: e.max_stress_mpa(model),
+        poses: moving(design, |b| from_rest(&e.state.poses[b])),
+    });
+    let errors_mm = layout
+        .traces
+        .iter()
+        .enumerate()
+        .map(|(i, t)| {
+            let distance = |(e, target): (&Equilibrium, &Vector3<f64>)| {
+                (e.state.poses[t.body].point(&t.rest) - target).norm()
+            };
+            // Without a drive the conventional mechanism stands still: that is no target.
+            let states = if design.has_target(i) { cycle.states.as_slice() } else { &[] };
+            states.iter().zip(&t.target).map(distance).collect()
+        })
+        .collect();
+    let mut diagnostics = judge(design, layout, cycle);
+    diagnostics.extend(news(design, motion));
+    diagnostics.extend(slack(design, model, cycle));
+    let aims = AimSeries::compliant(design, layout, motion, cycle);
+    let motion = MotionTable { more: aims.columns(design), ..table(design, true, states.collect()) };
+    let stress = most_stressed(design, model, cycle);
+    let sway_mm = gives_way(design, layout, model, cycle);
+    let worst = Worst { stress, gap: None };
+    Simulation { motion, errors_mm, aims, worst, sway_mm, diagnostics, ..Simulation::default() }
+}
+
+/// States at which the give of the traced points is looked at.
+const GIVE_STATES: usize = 8;
+
+/// How far each traced point gives way to 1 N across its path, at most over some states, mm: the directions are the
+/// stacking axis and the in-plane normal, to first order.
+fn gives_way(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> Vec<f64> {
+    let mut most = vec![0.0; layout.traces.len()];
+    if layout.traces.is_empty() || cycle.states.len() < 2 {
+        return most;
+    }
+    let mut solver = Solver::new(model);
+    let axis = Vector3::from(design.layers.axis);
+    let step = (cycle.states.len() / GIVE_STATES).max(1);
+    for s in (0..cycle.states.len() - 1).step_by(step) {
+        let (Some(here), Some(next)) = (cycle.states.get(s), cycle.states.get(s + 1)) else { continue };
+        let Ok(held) = solver.solve(model, here.state.clone(), &layout.controls(s)) else { continue };
+        for (most, trace) in most.iter_mut().zip(&layout.traces) {
+            let at = |e: &Equilibrium| e.state.poses[trace.body].point(&trace.rest);
+            let along = (at(next) - at(here)).try_normalize(NO_WAY_MM).unwrap_or_else(Vector3::x);
+            let normals = [axis.cross(&along), along.cross(&axis.cross(&along))];
+            for n in normals.iter().filter_map(|n| n.try_normalize(NO_WAY_MM)) {
+                let force = PointForce { body: trace.body, rest: trace.rest, force_n: n };
+                let response = solver.response(model, &held.state, &[force]);
+                if let Some(first) = layout.bodies.get(trace.body).and_then(|b| b.first_dof) {
+                    let part = |i: usize| Vector3::from_fn(|k, _| response[first + i + k]);
+                    let arm = held.state.poses[trace.body].arm(&trace.rest);
+                    *most = f64::max(*most, (part(0) + part(3).cross(&arm)).norm());
+                }
+            }
+        }
+    }
+    most
+}
+
+/// Ways shorter than this have no direction, mm.
+const NO_WAY_MM: f64 = 1e-9;
 
 /// Conventional motion and layout.
 pub(super) fn layout(design: &Design, values: &[f64]) -> Result<(Layout, Motion), Failed> {

@@ -8,6 +8,7 @@ mod examine;
 mod gravity;
 mod joined;
 mod lay;
+mod lints;
 mod manifest;
 mod measure;
 mod products;
@@ -36,6 +37,7 @@ pub use crate::elaborate::{FileError, Files};
 use crate::emit::arduino::Sketch;
 use crate::emit::lock::{Lock, LockState};
 use crate::ir::{Assembly, Design, ExportKind, Solution};
+use crate::lint::{Levels, Stage as Reached};
 use std::sync::atomic::AtomicBool;
 
 /// What is to be built.
@@ -57,6 +59,8 @@ pub struct Request {
     pub resume: bool,
     /// Refuse to solve: the lock must be current.
     pub frozen: bool,
+    /// Which findings are told, and how loudly.
+    pub levels: Levels,
 }
 
 /// Which motion `simulate` shows.
@@ -91,6 +95,7 @@ pub fn build_upon(
     let began = progress.seconds();
     let mut out = BuildOutcome::default();
     run_build(request, made, stages, files, progress, cancel, &mut out);
+    lints::finish(request, &mut out);
     out.seconds.total = progress.seconds() - began;
     out
 }
@@ -110,6 +115,10 @@ fn run_build(
     let assembly = front_end(request, stages, files, out);
     clock.stop(&mut out.seconds.check);
     let assembly = assembly?;
+    // What is denied and known by now need not be solved first.
+    if lints::denied(request, out) {
+        return None;
+    }
 
     // Designs to values.
     let clock = Clock::start(progress, Stage::Solve);
@@ -127,10 +136,12 @@ fn run_build(
     if let Some(recalled) = recalled {
         (out.before, out.after, out.kept) = (recalled.before, recalled.after, recalled.kept);
         (out.requirements, out.unchanged) = (recalled.requirements, true);
+        out.reached = Reached::Parts;
         out.diagnostics.extend(recalled.diagnostics);
         return Some(());
     }
     let told = out.diagnostics.len();
+    out.reached = Reached::Flexures;
 
     // Values to numbers: before, after, and what was required.
     let clock = Clock::start(progress, Stage::Simulate);
@@ -151,6 +162,7 @@ fn run_build(
     tell_once(between.diagnostics.iter().cloned(), out);
     let placed = assembly::place(&assembly, &simulations);
     out.after = Some(assembly::measure_all(&assembly, &placed, &between));
+    lints::solved(&assembly, &values, &simulations, stages, out);
     out.requirements = assembly::check_all(&assembly, &simulations, &placed, &between, &mut out.diagnostics);
 
     // Values to files.
@@ -160,10 +172,12 @@ fn run_build(
     {
         out.artefacts.extend(parts);
         tell_once(found, out);
+        lints::parts(&assembly, out);
     }
     clock.stop(&mut out.seconds.mesh);
     let clock = Clock::start(progress, Stage::Emit);
     emit_sketches(&assembly, &values, out);
+    out.reached = Reached::Parts;
     let manifest = manifest::write(out, told, &fingerprint);
     out.manifest = manifest.map(|bytes| Artefact { name: manifest::name(&request.source), bytes });
     clock.stop(&mut out.seconds.emit);
@@ -173,7 +187,14 @@ fn run_build(
 /// Text to a design without errors.
 pub fn check(request: &Request, stages: &dyn Stages, files: &dyn Files) -> BuildOutcome {
     let mut out = BuildOutcome::default();
-    front_end(request, stages, files, &mut out);
+    if let Some(assembly) = front_end(request, stages, files, &mut out) {
+        // Where the lock is current, the solution can be looked at for the price of a sweep.
+        let simulated = lints::from_lock(request, &assembly, stages, &mut out);
+        if let Some((values, simulations)) = simulated {
+            lints::solved(&assembly, &values, &simulations, stages, &mut out);
+        }
+    }
+    lints::finish(request, &mut out);
     out
 }
 
@@ -238,16 +259,24 @@ fn front_end(
         stages.check(&request.source, &request.overrides, request.steps, request.variant.as_deref(), files);
     out.sources = checked.sources;
     out.variants = checked.variants;
+    out.files = checked.files;
     out.diagnostics.extend(checked.diagnostics);
+    out.diagnostics.extend(crate::lint::levels::judge(&out.files));
     if out.diagnostics.iter().any(Diagnostic::is_error) {
         return None;
     }
     let assembly = checked.assembly?;
+    let told = out.diagnostics.len();
+    lints::text(&assembly, out);
     // That it can be assembled all the way is part of being right.
+    let mut motions = Vec::new();
     for design in &assembly.designs {
         let rigid = keep(stages.rigid(design, &starts(design)), &mut out.diagnostics)?;
         tell_once(rigid.diagnostics, out);
+        motions.push(rigid.conventional);
     }
+    lints::moving(&assembly, &motions, stages, out);
+    lints::sort(out, told);
     out.design = assembly.single().cloned();
     out.assembly = Some(assembly.clone());
     Some(assembly)

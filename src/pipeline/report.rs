@@ -3,7 +3,9 @@
 use super::aims::{DirectionMeasures, OutputMeasures};
 use super::stability::Stability;
 use crate::diagnostic::{Diagnostic, SourceMap};
+use crate::elaborate::OwnFile;
 use crate::ir::{Assembly, Design, Solution};
+use crate::lint::Stage;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -206,6 +208,10 @@ pub enum Origin {
 pub struct BuildOutcome {
     /// The files read.
     pub sources: SourceMap,
+    /// The design's own files as understood.
+    pub files: Vec<OwnFile>,
+    /// How far it came.
+    pub reached: Stage,
     /// Findings of all stages, in their order.
     pub diagnostics: Vec<Diagnostic>,
     /// What is built.

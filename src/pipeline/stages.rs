@@ -6,9 +6,10 @@ use super::progress::Iteration;
 use super::report::{Artefact, Worst};
 use super::stability::Stability;
 use crate::diagnostic::{Diagnostic, SourceMap};
-use crate::elaborate::Files;
+use crate::elaborate::{Files, OwnFile};
 use crate::emit::csv::MotionTable;
 use crate::ir::{Assembly, Design, Solution};
+use crate::kinematics::Motion;
 use std::sync::atomic::AtomicBool;
 
 /// Findings of a stage that gave nothing.
@@ -23,6 +24,8 @@ pub struct Checked {
     pub assembly: Option<Assembly>,
     /// Names of its variants.
     pub variants: Vec<String>,
+    /// The design's own files as understood.
+    pub files: Vec<OwnFile>,
     /// Findings.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -42,6 +45,11 @@ pub struct Simulation {
     pub worst: Worst,
     /// What the released mechanism does.
     pub stability: Stability,
+    /// How far each traced point gives way to 1 N across its path, at most over some states, mm; of a conventional
+    /// motion nothing.
+    pub sway_mm: Vec<f64>,
+    /// Of a conventional motion, the motion.
+    pub conventional: Option<Motion>,
     /// Findings that do not stop the work.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -109,6 +117,24 @@ pub trait Stages {
     /// # Errors
     /// Where no equilibrium is found.
     fn simulate(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed>;
+
+    /// As [`Self::simulate`], without what only printed solids and released drives show: what a check can afford.
+    ///
+    /// # Errors
+    /// Where no equilibrium is found.
+    fn sweep(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
+        self.simulate(design, values)
+    }
+
+    /// Lengths of all flexures in the rest pose, mm; none where one has no shape. `motion` is that of these values.
+    fn flexure_lengths(&self, _design: &Design, _values: &[f64], _motion: &Motion) -> Option<Vec<f64>> {
+        None
+    }
+
+    /// The terms of the objective by name, and their contributions; empty where there are none or they cannot be computed.
+    fn terms(&self, _design: &Design, _values: &[f64]) -> Vec<(String, f64)> {
+        Vec::new()
+    }
 
     /// What the instances of an assembly are to each other; `values` are those of each design. Nothing where there is one
     /// instance, or no printed form.
