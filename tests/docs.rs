@@ -9,6 +9,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 const LANGUAGE: &str = include_str!("../docs/language.md");
+const TUTORIAL: &str = include_str!("../docs/tutorial.md");
+const GUIDE: &str = include_str!("../docs/guide-linkage.md");
 const README: &str = include_str!("../README.md");
 
 /// The blocks that begin with this fence.
@@ -69,6 +71,12 @@ fn samples_of_the_manual_compile() {
         }
         assert_eq!(errors(&host), [""; 0], "{host}");
     }
+    // Whole files besides.
+    let files = blocks(LANGUAGE, "mech file");
+    assert!(files.len() >= 3);
+    for text in &files {
+        assert_eq!(errors(text), [""; 0], "{text}");
+    }
     // Mechanisms that place the design.
     let instances = blocks(LANGUAGE, "mech instances");
     assert!(!instances.is_empty());
@@ -84,6 +92,153 @@ fn samples_of_the_manual_compile() {
         .replace("polyjet", "my_printer")
         .replace("nema17", "my_stepper");
     assert_eq!(errors(&format!("{own}\n{parts}")), [""; 0]);
+}
+
+/// The file with a change made to it: a line takes the place of the one that declares the same, or goes before the last brace.
+fn changed(text: &str, change: &str) -> String {
+    let mut lines: Vec<String> = text.lines().map(String::from).collect();
+    let key = |line: &str| {
+        let declares =
+            line.starts_with("    ") && !line.starts_with("     ") && !line.trim().starts_with(['}', '/']);
+        declares.then(|| line.split_whitespace().take(2).collect::<Vec<_>>().join(" "))
+    };
+    for line in change.lines() {
+        let old = key(line).and_then(|k| lines.iter().position(|l| key(l).as_ref() == Some(&k)));
+        match old {
+            Some(at) => lines[at] = line.into(),
+            None if line.starts_with("use ") => {
+                let at = lines.iter().rposition(|l| l.starts_with("use ")).map_or(0, |i| i + 1);
+                lines.insert(at, line.into());
+            }
+            None => {
+                let end = lines.iter().rposition(|l| l == "}").unwrap();
+                lines.insert(end, line.into());
+            }
+        }
+    }
+    lines.join("\n") + "\n"
+}
+
+/// Goes through a page as a reader does: writes its files, makes its changes, runs its commands and compares what they answer.
+/// Every line that is shown stands in the answer, in this order; `…` leaves something out, within a line its rest.
+fn follow(page: &str) -> usize {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut file, mut text, mut answer) = (String::new(), String::new(), String::new());
+    let mut compared = 0;
+    let mut rest = page.lines();
+    while let Some(line) = rest.next() {
+        let Some(fence) = line.strip_prefix("```") else { continue };
+        let block: Vec<&str> = rest.by_ref().take_while(|l| *l != "```").collect();
+        match fence.split_once(' ').unwrap_or((fence, "")) {
+            ("mech", "change") => text = changed(&text, &block.join("\n")),
+            ("mech", name) => (file, text) = (name.into(), block.join("\n") + "\n"),
+            ("sh", _) => {
+                std::fs::write(folder.path().join(&file), &text).unwrap();
+                for command in block {
+                    // Words, those in quotes as one.
+                    let words: Vec<String> = command
+                        .split('"')
+                        .enumerate()
+                        .flat_map(|(i, part)| match i % 2 {
+                            0 => part.split_whitespace().map(String::from).collect(),
+                            _ => vec![part.to_string()],
+                        })
+                        .collect();
+                    assert_eq!(words[0], "flexura", "{command}");
+                    let out = std::process::Command::new(env!("CARGO_BIN_EXE_flexura"))
+                        .args(&words[1..])
+                        .current_dir(folder.path())
+                        .output()
+                        .unwrap();
+                    answer = [out.stderr, out.stdout].map(|b| String::from_utf8(b).unwrap()).concat();
+                }
+            }
+            ("text", _) => {
+                let mut lines = answer.lines();
+                for shown in block.into_iter().filter(|l| *l != "…" && !l.is_empty()) {
+                    let is = |l: &str| match shown.split_once('…') {
+                        Some((begins, ends)) => l.starts_with(begins) && l.ends_with(ends),
+                        None => l == shown,
+                    };
+                    assert!(
+                        lines.any(is),
+                        "not in the answer, or not in this order: {shown}\n{text}\n{answer}"
+                    );
+                    compared += 1;
+                }
+            }
+            other => panic!("what is {other:?}?"),
+        }
+    }
+    compared
+}
+
+#[test]
+fn the_tutorial_can_be_followed() {
+    assert!(follow(TUTORIAL) > 35);
+    // It ends where the default start begins.
+    let start = include_str!("../starts/hinge.mech");
+    for line in ["stress(below = 18 MPa, scale = 0.2 MPa)", "require max(stress())   <= petg.yield / 2"] {
+        assert!(TUTORIAL.contains(line) && start.contains(line), "{line}");
+    }
+}
+
+#[test]
+fn the_guide_can_be_followed() {
+    assert!(follow(GUIDE) > 6);
+}
+
+/// Every word of the grammar, function, unit, type, field, flexure and mechanism stands in the manual, words and functions in
+/// a sample that compiles.
+#[test]
+fn the_manual_is_complete() {
+    let grammar = include_str!("../grammar/mech.pest");
+    let samples: String = ["mech", "mech mechanism", "mech instances", "mech file"]
+        .iter()
+        .flat_map(|fence| blocks(LANGUAGE, fence))
+        .collect();
+    let word =
+        |text: &str, word: &str| text.split(|c: char| !c.is_alphanumeric() && c != '_').any(|w| w == word);
+    let quoted = |line: &str| line.split('"').nth(1).map(String::from);
+    let keywords: Vec<String> =
+        grammar.lines().filter(|l| l.starts_with("kw_") && l.contains("!idch")).filter_map(quoted).collect();
+    assert!(keywords.len() > 60, "{}", keywords.len());
+    for k in &keywords {
+        assert!(word(&samples, k), "no sample of the manual has the word `{k}`");
+    }
+    // Lists of names in the elaborator: what follows a constant up to its `;`.
+    let list = |text: &'static str, name: &str| -> Vec<&'static str> {
+        let at = text.find(&format!("const {name}: ")).unwrap_or_else(|| panic!("{name}"));
+        text[at..].split(';').next().unwrap().split('"').skip(1).step_by(2).collect()
+    };
+    let functions = include_str!("../src/elaborate/functions.rs");
+    let terms = include_str!("../src/elaborate/terms.rs");
+    let require = include_str!("../src/elaborate/require.rs");
+    let goals = include_str!("../src/elaborate/goals.rs");
+    let mut called: Vec<&str> = list(functions, "FUNCTIONS");
+    called.extend(list(terms, "TERMS"));
+    called.extend(list(require, "AGGREGATES").into_iter().chain(list(require, "QUANTITIES")));
+    called.extend(list(goals, "EXPORTS"));
+    called.extend(["cyl", "sph", "ellipse", "rect", "round", "points"]);
+    assert!(called.len() > 35, "{}", called.len());
+    for f in &called {
+        assert!(word(&samples, f), "no sample of the manual has `{f}`");
+    }
+    for unit in flexura::elaborate::units::UNITS {
+        assert!(LANGUAGE.contains(unit.symbol), "{}", unit.symbol);
+    }
+    for name in flexura::elaborate::dimension::Dimension::type_names() {
+        assert!(word(LANGUAGE, name), "type {name}");
+    }
+    let records = include_str!("../src/elaborate/records.rs");
+    for field in records.lines().filter(|l| l.contains("field(\"")).filter_map(quoted) {
+        assert!(word(&samples, &field), "no sample of the manual has the field `{field}`");
+    }
+    for module in flexura::elaborate::std_modules() {
+        let (folder, name) = module.split_once('.').unwrap();
+        let shown = matches!(folder, "flexures" | "mechanisms" | "motors" | "processes");
+        assert!(!shown || LANGUAGE.contains(&format!("`{name}`")), "{module}");
+    }
 }
 
 #[test]
