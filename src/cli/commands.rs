@@ -1,6 +1,8 @@
 //! One function a command: files to a request, the pipeline, its outcome to files and reports.
 
 use super::artefacts::{Output, WriteError, write_atomic, write_below};
+use super::interrupt;
+use super::manners::Manners;
 use super::progress::Terminal;
 use super::render::tell;
 use super::sources::{Folder, read_text};
@@ -11,15 +13,11 @@ use flexura::emit::csv::{MotionTable, columns, values, write_csv};
 use flexura::pipeline::{self, BuildOutcome, Compiler, FileError, Request, Show, placeless};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Exit code: all is well.
 pub const FINE: u8 = 0;
 /// Exit code: the design has errors, a requirement fails, or a file cannot be read or written.
 pub const FAILED: u8 = 1;
-/// Exit code after a second Ctrl-C, as shells have it for SIGINT.
-const INTERRUPTED: i32 = 130;
 
 /// `flexura check`.
 pub fn check(common: &Common) -> u8 {
@@ -30,7 +28,7 @@ pub fn check(common: &Common) -> u8 {
     let mut out = pipeline::check(&opened.request, &Compiler::default(), &opened.folder);
     opened.name_as_written(&mut out.sources);
     render::report(&out.diagnostics, &out.sources, common.format);
-    if common.format == Format::Human {
+    if common.format == Format::Human && !Manners::chosen().quiet {
         match (&out.assembly, render::counts(&out.diagnostics)) {
             (Some(assembly), counts) if counts.is_empty() => {
                 print(&format!("{}: no errors\n", assembly.name));
@@ -131,12 +129,13 @@ pub fn build(arguments: &Build) -> u8 {
         Ok(path) => path,
         Err(why) => return finish_build(unopened(&why), common.format, &[]),
     };
-    let progress = Terminal::new(common.format == Format::Human);
-    let cancel = stop_on_ctrl_c(progress.on_stop());
+    let progress = Terminal::new(common.format == Format::Human && !Manners::chosen().quiet);
+    let cancel = interrupt::during(progress.on_stop());
     let compiler = Compiler { method: arguments.optimizer.into(), iterations: arguments.iterations as usize };
     let made = Output(&arguments.out);
     let mut out = pipeline::build_upon(&opened.request, &made, &compiler, &opened.folder, &progress, &cancel);
     progress.finish();
+    interrupt::over();
     opened.name_as_written(&mut out.sources);
     let written = match write(&out, &arguments.out, &lock_path) {
         Ok(written) => written,
@@ -154,6 +153,7 @@ fn finish_build(out: BuildOutcome, format: Format, written: &[(String, usize)]) 
         Format::Human => {
             render::show(&out.diagnostics, &out.sources);
             match &out.assembly {
+                Some(_) if Manners::chosen().quiet => {}
                 Some(_) => {
                     print(&human::report(&out, written, Style::stdout()));
                 }
@@ -205,22 +205,6 @@ pub fn print(text: &str) -> u8 {
         Ok(()) => FINE,
         Err(_) => FAILED,
     }
-}
-
-/// Set by the first Ctrl-C; the second ends the program.
-fn stop_on_ctrl_c(say: impl Fn() + Send + 'static) -> Arc<AtomicBool> {
-    let cancel = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&cancel);
-    let handler = move || {
-        if flag.swap(true, Ordering::SeqCst) {
-            std::process::exit(INTERRUPTED);
-        }
-        say();
-    };
-    if let Err(e) = ctrlc::set_handler(handler) {
-        tell(&format!("warning: Ctrl-C will not keep the best point: {e}\n"));
-    }
-    cancel
 }
 
 /// A source and the folder it stands in.
