@@ -93,7 +93,8 @@ fn every_rule_finds_what_it_is_for_and_nothing_in_a_sound_design() {
         let mut places: Vec<_> = found.iter().map(|d| place(d, &out)).collect();
         places.sort();
         if places != wanted || !errors(&out).is_empty() {
-            let told: Vec<_> = out.diagnostics.iter().map(|d| format!("  {} {}", d.code, d.message)).collect();
+            let told: Vec<_> =
+                out.diagnostics.iter().map(|d| format!("  {} {}", d.code, d.message)).collect();
             failures.push(format!("{code} bad: {places:?}, wanted {wanted:?}\n{}", told.join("\n")));
         }
         for d in &found {
@@ -117,8 +118,12 @@ fn every_repair_compiles_and_takes_its_finding_away() {
         let code = entry.rule.code;
         let (bad, _) = pair(entry);
         let out = run(&bad, entry.rule.stage(), Levels::default());
-        let fixes: Vec<_> =
-            out.diagnostics.iter().filter(|d| d.code == code).flat_map(|d| d.fixes.iter().map(move |f| (d, f))).collect();
+        let fixes: Vec<_> = out
+            .diagnostics
+            .iter()
+            .filter(|d| d.code == code)
+            .flat_map(|d| d.fixes.iter().map(move |f| (d, f)))
+            .collect();
         for (d, fix) in &fixes {
             repaired.push(code);
             let new = apply(&out.sources, [*fix]);
@@ -133,7 +138,11 @@ fn every_repair_compiles_and_takes_its_finding_away() {
         let page = entry.page();
         let says = |word: &str| page.contains(word);
         assert_eq!(fixes.iter().any(|(_, f)| f.safe), says("`--fix`"), "{code}: the page and safe repairs");
-        assert_eq!(fixes.iter().any(|(_, f)| !f.safe), says("`--unsafe-fixes`"), "{code}: the page and risky repairs");
+        assert_eq!(
+            fixes.iter().any(|(_, f)| !f.safe),
+            says("`--unsafe-fixes`"),
+            "{code}: the page and risky repairs"
+        );
         assert_eq!(fixes.is_empty(), says("no repair by itself"), "{code}: the page and no repair");
     }
     repaired.dedup();
@@ -192,14 +201,19 @@ fn an_allow_covers_its_statement_its_block_or_its_file() {
     assert_eq!(told(&block), "", "set apart it covers the mechanism");
     let file = text.replacen("use std", "allow W1001 \"later\"\n\nuse std", 1);
     assert_eq!(told(&file), "", "outside of blocks the file");
-    let needless = block.replace(UNUSED.lines().next().unwrap(), "").replace(UNUSED.lines().nth(1).unwrap(), "");
+    let needless =
+        block.replace(UNUSED.lines().next().unwrap(), "").replace(UNUSED.lines().nth(1).unwrap(), "");
     assert_eq!(told(&needless), "W1000", "{needless}");
     // What only a build looks for is not judged by a check.
     let later = text.replace("    point X", "    allow W1301 \"later\"\n\n    point X");
     assert_eq!(told(&later), "W1001 W1001");
     let error = |text: &str| {
         let out = run(text, Stage::Flexures, Levels::default());
-        out.diagnostics.iter().filter(|d| d.is_error()).map(|d| (d.code.clone(), place(d, &out).1)).collect::<Vec<_>>()
+        out.diagnostics
+            .iter()
+            .filter(|d| d.is_error())
+            .map(|d| (d.code.clone(), place(d, &out).1))
+            .collect::<Vec<_>>()
     };
     assert_eq!(error(&block.replace("W1001", "W1999")), [("E0118".to_string(), "W1999".to_string())]);
     assert_eq!(error(&block.replace("W1001", "E0101")), [("E0118".to_string(), "E0101".to_string())]);
@@ -210,7 +224,8 @@ fn an_allow_covers_its_statement_its_block_or_its_file() {
 fn levels_of_flags_and_configuration() {
     let text = two_unused();
     let with = |flags: &[(&str, Level)], config: &[(&str, Level)]| {
-        let list = |l: &[(&str, Level)]| l.iter().map(|(s, l)| (s.parse::<Selector>().unwrap(), *l)).collect();
+        let list =
+            |l: &[(&str, Level)]| l.iter().map(|(s, l)| (s.parse::<Selector>().unwrap(), *l)).collect();
         let levels = Levels { flags: list(flags), config: list(config), baseline: None };
         let out = run(&text, Stage::Flexures, levels);
         let found = out.diagnostics.iter().filter(|d| d.code == "W1001");
@@ -220,10 +235,17 @@ fn levels_of_flags_and_configuration() {
     assert_eq!(with(&[("warnings", Level::Deny)], &[]), (2, 2));
     assert_eq!(with(&[("W1001", Level::Allow)], &[]), (0, 0));
     assert_eq!(with(&[("unused-point", Level::Allow)], &[]), (0, 0), "by its name");
-    assert_eq!(with(&[("warnings", Level::Deny), ("W1001", Level::Warn)], &[]), (0, 2), "one goes before many");
+    assert_eq!(
+        with(&[("warnings", Level::Deny), ("W1001", Level::Warn)], &[]),
+        (0, 2),
+        "one goes before many"
+    );
     assert_eq!(with(&[], &[("W1001", Level::Deny)]), (2, 2));
     assert_eq!(with(&[("all", Level::Warn)], &[("W1001", Level::Deny)]), (0, 2), "flags go before the file");
-    assert!("E0101".parse::<Selector>().is_err() && "W10011".parse::<Selector>().unwrap_err().contains("did you mean"));
+    assert!(
+        "E0101".parse::<Selector>().is_err()
+            && "W10011".parse::<Selector>().unwrap_err().contains("did you mean")
+    );
 }
 
 #[test]

@@ -75,7 +75,7 @@ pub fn check(arguments: &Check) -> u8 {
     }
     opened.name_as_written(&mut out.sources);
     report(&out.diagnostics, &out.sources, common.format);
-    if common.format == Format::Human {
+    if common.format == Format::Human && !super::manners::Manners::chosen().quiet {
         if repaired > 0 {
             tell(&format!("{}: {repaired} repaired\n", common.source.display()));
         }

@@ -1,6 +1,8 @@
 //! One function a command: files to a request, the pipeline, its outcome to files and reports.
 
 use super::artefacts::{Output, WriteError, write_atomic, write_below};
+use super::interrupt;
+use super::manners::Manners;
 use super::progress::Terminal;
 use super::render::tell;
 use super::sources::{Folder, read_text};
@@ -11,15 +13,12 @@ use flexura::emit::csv::{MotionTable, columns, values, write_csv};
 use flexura::pipeline::{self, BuildOutcome, Compiler, FileError, Request, Show, placeless};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Exit code: all is well.
 pub const FINE: u8 = 0;
 /// Exit code: the design has errors, a requirement fails, or a file cannot be read or written.
 pub const FAILED: u8 = 1;
-/// Exit code after a second Ctrl-C, as shells have it for SIGINT.
-const INTERRUPTED: i32 = 130;
 
 /// `flexura ir`.
 pub fn ir(common: &Common) -> u8 {
@@ -100,8 +99,8 @@ fn motion_json(out: &BuildOutcome, table: Option<&MotionTable>) -> serde_json::V
 /// `flexura build`.
 pub fn build(arguments: &Build) -> u8 {
     let format = arguments.common.format;
-    let progress = Terminal::new(format == Format::Human);
-    let cancel = stop_on_ctrl_c(progress.on_stop());
+    let progress = Terminal::new(format == Format::Human && !Manners::chosen().quiet);
+    let cancel = interrupt::during(progress.on_stop());
     let mut builds = vec![build_one(arguments, arguments.common.variant.as_deref(), &progress, &cancel)];
     if arguments.all_variants {
         let variants = builds.first().map(|(out, _)| out.variants.clone()).unwrap_or_default();
@@ -113,6 +112,7 @@ pub fn build(arguments: &Build) -> u8 {
         }
     }
     progress.finish();
+    interrupt::over();
     match builds.as_slice() {
         [(out, written)] if !arguments.all_variants => finish_build(out, format, written),
         _ => finish_builds(&builds, format),
@@ -201,6 +201,7 @@ fn finish_build(out: &BuildOutcome, format: Format, written: &[(String, usize)])
         Format::Human => {
             render::show(&out.diagnostics, &out.sources);
             match &out.assembly {
+                Some(_) if Manners::chosen().quiet => {}
                 Some(_) => {
                     print(&human::report(out, written, Style::stdout()));
                 }
@@ -256,22 +257,6 @@ pub fn print(text: &str) -> u8 {
         Ok(()) => FINE,
         Err(_) => FAILED,
     }
-}
-
-/// Set by the first Ctrl-C; the second ends the program.
-fn stop_on_ctrl_c(say: impl Fn() + Send + 'static) -> Arc<AtomicBool> {
-    let cancel = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&cancel);
-    let handler = move || {
-        if flag.swap(true, Ordering::SeqCst) {
-            std::process::exit(INTERRUPTED);
-        }
-        say();
-    };
-    if let Err(e) = ctrlc::set_handler(handler) {
-        tell(&format!("warning: Ctrl-C will not keep the best point: {e}\n"));
-    }
-    cancel
 }
 
 /// A source and the folder it stands in.

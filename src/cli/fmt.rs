@@ -2,6 +2,7 @@
 
 use super::artefacts::write_atomic;
 use super::commands::{FAILED, FINE, print};
+use super::manners::Manners;
 use super::render;
 use super::sources::{MOST_BYTES, read_text};
 use clap::Args;
@@ -43,7 +44,7 @@ pub fn fmt(arguments: &Fmt) -> u8 {
         }
     }
     render::show(&run.found, &run.sources);
-    if arguments.check && run.changed > 0 {
+    if arguments.check && run.changed > 0 && !Manners::chosen().quiet {
         let files = if run.changed == 1 { "file is" } else { "files are" };
         render::tell(&format!("{} {files} not formatted; `flexura fmt` does it\n", run.changed));
     }

@@ -4,33 +4,42 @@
 mod artefacts;
 mod check;
 mod commands;
+mod config;
 mod diff;
 mod doc;
 mod explain;
 mod fmt;
 mod git;
 mod human;
+mod interrupt;
 mod junit;
 mod lints;
+mod manners;
 mod new;
 mod progress;
 mod released;
 mod render;
 mod sarif;
+mod shells;
 mod sources;
 mod style;
 mod test;
+mod usage;
+mod watch;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Compliant mechanisms from text: optimised flexures, printable parts, motor code.
 ///
-/// Exit codes: 0 fine, 1 the design has errors or a requirement fails, 2 wrong usage.
+/// Exit codes: 0 fine; 1 the design has errors, a requirement fails, a file cannot be read or written, or a check finds
+/// something to do; 2 wrong usage; 130 ended by Ctrl-C.
 #[derive(Debug, Parser)]
-#[command(name = "flexura", version, arg_required_else_help = true)]
+#[command(name = "flexura", version, arg_required_else_help = true, max_term_width = 100, after_help = EXAMPLES)]
 struct Cli {
+    #[command(flatten)]
+    manners: manners::Manners,
     #[command(subcommand)]
     command: Command,
 }
@@ -41,20 +50,30 @@ enum Command {
     ///
     /// With a current lock beside the design, its solution is looked at too. Findings are silenced where they are
     /// known: `allow CODE "reason"` in the text, a flexura.toml, the flags below. `flexura explain CODE` tells of each.
+    #[command(
+        after_help = "Examples:\n  flexura check leg.mech\n  flexura check leg.mech --watch\n  flexura check leg.mech --format json"
+    )]
     Check(check::Check),
     /// Solve a design and write its parts and sketches
     ///
     /// The solved values go into NAME.lock beside the source; with --set or --steps it goes into the
     /// output folder, so that trying things out leaves the design's own lock alone. Ctrl-C ends the
     /// optimisation and keeps the best point found; a second one ends the program at once.
+    #[command(
+        after_help = "Examples:\n  flexura build leg.mech --out made\n  flexura build leg.mech --set \"r=25 mm\"\n  flexura build leg.mech --frozen      for CI: refuses to solve, the lock must be current\n  flexura build leg.mech --resume --iterations 300"
+    )]
     Build(Build),
     /// Write the motion over the cycle as CSV
     ///
     /// Shows the lock's values if it belongs to the design, else the design's start. One row a state:
     /// drive values (deg), traced points (mm), drive torques (N*mm), elastic energy (N*mm) and the largest
     /// von Mises stress (MPa). With --format json the same table is one object: columns, rows, diagnostics.
+    #[command(
+        after_help = "Examples:\n  flexura simulate leg.mech -o motion.csv\n  flexura simulate leg.mech --rigid\n  flexura simulate leg.mech --poses --format json"
+    )]
     Simulate(Simulate),
     /// Print the elaborated design as JSON
+    #[command(after_help = "Examples:\n  flexura ir leg.mech > leg.json")]
     Ir(Common),
     /// Check the `require` lines of many designs
     Test(test::Test),
@@ -71,7 +90,24 @@ enum Command {
     Diff(diff::Diff),
     /// Tell what a finding means, why it matters and what to do
     Explain(explain::Explain),
+    /// Print completions for a shell
+    Completions(shells::Completions),
+    /// Print the manual pages
+    Man(shells::Man),
 }
+
+const EXAMPLES: &str = "Examples:
+  flexura check leg.mech                   what is wrong with a design
+  flexura build leg.mech                   solve it, write parts and sketches into out/
+  flexura build leg.mech --set \"r=25 mm\"  try another size
+  flexura build leg.mech --watch           again after every change
+  flexura simulate leg.mech -o motion.csv  the motion as a table
+  flexura fmt                              one look for all files
+
+Defaults of a project stand in flexura.toml, beside the design or above it in its repository:
+  [build]
+  out = \"made\"
+  iterations = 300";
 
 /// What every command takes.
 #[derive(Clone, Debug, Args)]
@@ -90,6 +126,9 @@ struct Common {
     /// Number of threads [default: one a core]; the result does not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Do it again whenever the design, what it imports or flexura.toml changes; Ctrl-C ends
+    #[arg(long)]
+    watch: bool,
     /// How to report
     #[arg(long, value_enum, default_value_t = Format::Human)]
     format: Format,
@@ -183,7 +222,41 @@ struct Simulate {
 
 /// Runs the command line.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    // Outermost first: what was given counts more than what is configured, and that more than what is built in.
+    let matches = match Cli::command().try_get_matches() {
+        Ok(matches) => matches,
+        Err(e) => return usage::answer(&e),
+    };
+    let cli = match Cli::from_arg_matches(&matches) {
+        Ok(cli) => cli,
+        Err(e) => return usage::answer(&e),
+    };
+    cli.manners.choose();
+    let watching = cli.command.common().is_some_and(|c| c.watch);
+    let once = || {
+        let began = std::time::Instant::now();
+        let code = match Cli::from_arg_matches(&matches) {
+            Ok(cli) => configured(cli, &matches),
+            Err(_) => commands::FAILED,
+        };
+        if cli.manners.verbose {
+            for (path, _) in sources::seen() {
+                render::tell(&format!("read {}\n", path.display()));
+            }
+            render::tell(&format!("took {:.3} s\n", began.elapsed().as_secs_f64()));
+        }
+        code
+    };
+    ExitCode::from(if watching { watch::watch(once) } else { once() })
+}
+
+/// One run, with the configuration as it is now.
+fn configured(mut cli: Cli, matches: &clap::ArgMatches) -> u8 {
+    if let Err((found, sources)) = config::apply(&mut cli, matches) {
+        let format = cli.command.common().map_or(Format::Human, |c| c.format);
+        render::report(&found, &sources, format);
+        return commands::FAILED;
+    }
     let threads = match &cli.command {
         Command::Check(check) => check.common.threads,
         Command::Explain(_) => None,
@@ -208,8 +281,10 @@ pub fn main() -> ExitCode {
         Command::Doc(arguments) => doc::run(arguments),
         Command::Diff(arguments) => diff::run(arguments),
         Command::Explain(arguments) => explain::explain(arguments),
+        Command::Completions(arguments) => shells::completions(arguments),
+        Command::Man(arguments) => shells::man(arguments),
     };
-    let code = match threads {
+    match threads {
         None => run(),
         Some(n) => match rayon::ThreadPoolBuilder::new().num_threads(usize::from(n)).build() {
             Ok(pool) => pool.install(run),
@@ -218,8 +293,7 @@ pub fn main() -> ExitCode {
                 commands::FAILED
             }
         },
-    };
-    ExitCode::from(code)
+    }
 }
 
 /// `NAME=VALUE`.

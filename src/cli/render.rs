@@ -1,6 +1,7 @@
 //! Shows diagnostics: chooses colour, width and stream for the renderers of `flexura::diagnostic`.
 
 use super::Format;
+use super::manners::Manners;
 use super::style::Style;
 use flexura::diagnostic::json::{JsonDiagnostic, diagnostics};
 use flexura::diagnostic::{Diagnostic, Severity, SourceMap, terminal};
@@ -21,8 +22,10 @@ pub fn tell(text: &str) {
 pub fn show(found: &[Diagnostic], sources: &SourceMap) {
     let width = terminal_size::terminal_size_of(std::io::stderr())
         .map_or(WIDTH, |(width, _)| usize::from(width.0).min(MOST_WIDTH));
+    let quiet = Manners::chosen().quiet;
+    let found: Vec<Diagnostic> = found.iter().filter(|d| d.is_error() || !quiet).cloned().collect();
     let style = terminal::Style { color: Style::stderr().is_coloured(), width };
-    tell(&terminal::render(found, sources, style));
+    tell(&terminal::render(&found, sources, style));
 }
 
 /// Shows diagnostics for people, or as `{"diagnostics": […]}` on the standard output.

@@ -1,9 +1,11 @@
 //! Reading from the disk: only text files below the design's own folder, and not without limit.
 
 use flexura::pipeline::{FileError, Files};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// Largest file read, bytes. The sample designs have about 3 kB, their locks less.
 pub const MOST_BYTES: u64 = 4 << 20;
@@ -16,7 +18,8 @@ pub struct Folder {
 impl Folder {
     /// The folder of a source, and the source's name in it.
     pub fn of(source: &Path) -> Result<(Self, String), FileError> {
-        let path = source.canonicalize().map_err(|e| reason(&e))?;
+        // What is missing may come.
+        let path = source.canonicalize().inspect_err(|_| note(source)).map_err(|e| reason(&e))?;
         let name = path.file_name().and_then(|n| n.to_str()).ok_or_else(not_a_name)?.to_string();
         let root = path.parent().ok_or_else(not_a_name)?.to_path_buf();
         Ok((Self { root }, name))
@@ -34,7 +37,9 @@ impl Files for Folder {
         if !relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir)) {
             return Err(FileError::Outside);
         }
-        let full = self.root.join(relative).canonicalize().map_err(|e| reason(&e))?;
+        let full = self.root.join(relative);
+        // What is missing may come.
+        let full = full.canonicalize().inspect_err(|_| note(&full)).map_err(|e| reason(&e))?;
         if !full.starts_with(&self.root) {
             return Err(FileError::Outside);
         }
@@ -44,6 +49,39 @@ impl Files for Folder {
 
 /// Text of a file, if it is a file, text, and not too large. (A pipe could block for ever.)
 pub fn read_text(path: &Path) -> Result<String, FileError> {
+    let read = read_unseen(path);
+    note(path);
+    read
+}
+
+/// What has been read since [`forget`], or looked for in vain: absolute paths and digests.
+static SEEN: Mutex<BTreeMap<PathBuf, Option<Vec<u8>>>> = Mutex::new(BTreeMap::new());
+
+fn note(path: &Path) {
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let digest = digest_of(&absolute);
+    SEEN.lock().unwrap_or_else(PoisonError::into_inner).entry(absolute).or_insert(digest);
+}
+
+/// Files read since the last [`forget`], by path, with their digests at that time.
+pub fn seen() -> Vec<(PathBuf, Option<Vec<u8>>)> {
+    let seen = SEEN.lock().unwrap_or_else(PoisonError::into_inner);
+    seen.iter().map(|(path, digest)| (path.clone(), digest.clone())).collect()
+}
+
+/// Begins anew.
+pub fn forget() {
+    SEEN.lock().unwrap_or_else(PoisonError::into_inner).clear();
+}
+
+/// Digest of a regular file; none where there is none.
+pub fn digest_of(path: &Path) -> Option<Vec<u8>> {
+    use sha2::Digest;
+    path.metadata().ok().filter(|m| m.is_file() && m.len() <= MOST_BYTES)?;
+    Some(sha2::Sha256::digest(std::fs::read(path).ok()?).to_vec())
+}
+
+fn read_unseen(path: &Path) -> Result<String, FileError> {
     if !path.metadata().map_err(|e| reason(&e))?.is_file() {
         return Err(FileError::Other("it is not a file".into()));
     }

@@ -1,5 +1,6 @@
-//! Colours, only where a person looks: on a terminal, and not when `NO_COLOR` is set.
+//! Colours, only where a person looks, or wants them.
 
+use super::manners::Manners;
 use std::io::IsTerminal;
 
 /// Whether to colour.
@@ -11,12 +12,12 @@ pub struct Style {
 impl Style {
     /// For the standard output.
     pub fn stdout() -> Self {
-        Self { colour: std::io::stdout().is_terminal() && wanted() }
+        Self { colour: wanted(std::io::stdout().is_terminal()) }
     }
 
     /// For the standard error.
     pub fn stderr() -> Self {
-        Self { colour: std::io::stderr().is_terminal() && wanted() }
+        Self { colour: wanted(std::io::stderr().is_terminal()) }
     }
 
     /// Without colours.
@@ -55,7 +56,6 @@ impl Style {
     }
 }
 
-fn wanted() -> bool {
-    std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty())
-        && std::env::var_os("TERM").is_none_or(|t| t != "dumb")
+fn wanted(terminal: bool) -> bool {
+    Manners::chosen().color.wanted(|name| std::env::var(name).ok(), terminal)
 }

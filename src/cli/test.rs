@@ -362,6 +362,14 @@ impl Common {
     /// A design as it is written.
     pub fn of(source: &Path) -> Self {
         let (source, overrides) = (source.to_path_buf(), Vec::new());
-        Self { source, overrides, steps: None, variant: None, threads: None, format: Format::Human }
+        Self {
+            source,
+            overrides,
+            steps: None,
+            variant: None,
+            threads: None,
+            format: Format::Human,
+            watch: false,
+        }
     }
 }

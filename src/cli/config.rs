@@ -1,0 +1,143 @@
+//! `flexura.toml`: what a project's commands do where nothing is said. The nearest one counts: beside the source, or in
+//! a folder above it up to that of the repository. Its table `[lints]` is the linter's.
+//!
+//! ```toml
+//! [build]
+//! out = "made"
+//! iterations = 300
+//! optimizer = "lm"
+//! threads = 2
+//! ```
+
+use super::sources::read_text;
+use super::{Build, Cli, Command, Common, Optimizer};
+use clap::ArgMatches;
+use clap::parser::ValueSource;
+use flexura::diagnostic::{Diagnostic, Origin, Severity, SourceMap};
+use flexura::pipeline::placeless;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// Name of the file.
+pub const NAME: &str = "flexura.toml";
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Config {
+    #[serde(default)]
+    build: BuildTable,
+    /// Read where findings are judged.
+    #[serde(default, rename = "lints")]
+    _lints: toml::Table,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BuildTable {
+    /// Relative to the configuration's folder.
+    out: Option<PathBuf>,
+    iterations: Option<u32>,
+    optimizer: Option<OptimizerName>,
+    threads: Option<std::num::NonZeroU16>,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum OptimizerName {
+    Lm,
+    Lbfgs,
+    CmaEs,
+}
+
+/// Findings about the configuration, and the texts they point into.
+pub type Faults = (Vec<Diagnostic>, SourceMap);
+
+/// Puts the configuration's values where the command line gave none.
+pub fn apply(cli: &mut Cli, matches: &ArgMatches) -> Result<(), Faults> {
+    let Some((_, given)) = matches.subcommand() else { return Ok(()) };
+    let said = |name: &str| given.value_source(name) == Some(ValueSource::CommandLine);
+    let Some(common) = cli.command.common() else { return Ok(()) };
+    let Some((config, folder)) = read(&common.source)? else { return Ok(()) };
+    let table = config.build;
+    if let (false, Some(threads), Some(common)) = (said("threads"), table.threads, cli.command.common_mut()) {
+        common.threads = Some(threads.get());
+    }
+    if let (
+        Some(out),
+        Command::Build(Build { out: chosen, .. }) | Command::Simulate(super::Simulate { out: chosen, .. }),
+    ) = (table.out.filter(|_| !said("out")), &mut cli.command)
+    {
+        *chosen = folder.join(out);
+    }
+    if let Command::Build(build) = &mut cli.command {
+        if let (false, Some(iterations)) = (said("iterations"), table.iterations) {
+            build.iterations = iterations;
+        }
+        if let (false, Some(optimizer)) = (said("optimizer"), table.optimizer) {
+            build.optimizer = match optimizer {
+                OptimizerName::Lm => Optimizer::Lm,
+                OptimizerName::Lbfgs => Optimizer::Lbfgs,
+                OptimizerName::CmaEs => Optimizer::CmaEs,
+            };
+        }
+    }
+    Ok(())
+}
+
+impl Command {
+    /// Options of commands that read a design.
+    pub fn common(&self) -> Option<&Common> {
+        match self {
+            Command::Check(check) => Some(&check.common),
+            Command::Ir(common) => Some(common),
+            Command::Build(build) => Some(&build.common),
+            Command::Simulate(simulate) => Some(&simulate.common),
+            _ => None,
+        }
+    }
+
+    fn common_mut(&mut self) -> Option<&mut Common> {
+        match self {
+            Command::Check(check) => Some(&mut check.common),
+            Command::Ir(common) => Some(common),
+            Command::Build(build) => Some(&mut build.common),
+            Command::Simulate(simulate) => Some(&mut simulate.common),
+            _ => None,
+        }
+    }
+}
+
+/// The configuration that counts for a source, and its folder.
+fn read(source: &Path) -> Result<Option<(Config, PathBuf)>, Faults> {
+    // An unreadable source is told by the command itself.
+    let Some(folder) = source.canonicalize().ok().and_then(|p| p.parent().map(Path::to_path_buf)) else {
+        return Ok(None);
+    };
+    let Some(path) = nearest(&folder) else { return Ok(None) };
+    let mut sources = SourceMap::default();
+    let text = match read_text(&path) {
+        Ok(text) => text,
+        Err(why) => {
+            let message = format!("cannot read `{}`: {why}", path.display());
+            return Err((vec![placeless(Severity::Error, "E0730", message)], sources));
+        }
+    };
+    let file = sources.add(path.display().to_string(), text.clone());
+    match toml::from_str(&text) {
+        Ok(config) => Ok(Some((config, path.parent().map(Path::to_path_buf).unwrap_or_default()))),
+        Err(e) => {
+            let place = e.span().unwrap_or(0..0);
+            let at = Origin { file, start: place.start as u32, end: place.end as u32 };
+            let message = format!("this configuration cannot be read: {}", e.message().trim_end());
+            let help = "it may hold a table `[build]` with out, iterations, optimizer, threads, and a table `[lints]`";
+            Err((vec![Diagnostic::error("E0740", message, at).help(help)], sources))
+        }
+    }
+}
+
+/// Beside the source, or above it up to the repository's folder.
+fn nearest(folder: &Path) -> Option<PathBuf> {
+    let top = folder.ancestors().find(|a| a.join(".git").exists()).unwrap_or(folder);
+    let within = folder.ancestors().take_while(|a| a.starts_with(top));
+    within.map(|a| a.join(NAME)).find(|p| p.is_file())
+}
