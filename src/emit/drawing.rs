@@ -107,7 +107,7 @@ impl View {
         let _ = writeln!(out, "<g stroke-linecap=\"round\" stroke-linejoin=\"round\" fill=\"none\">");
         for outline in &scene.outlines {
             let colour = if outline.ground { "#b9bcc2" } else { "#cfd8e6" };
-            let _ = writeln!(out, "<g stroke=\"{colour}\"><title>{}</title>", escaped(&outline.name));
+            let _ = writeln!(out, "<g stroke=\"{colour}\" opacity=\"0.8\"><title>{}</title>", escaped(&outline.name));
             let mut lines: Vec<String> = Vec::new();
             for bar in &outline.bars {
                 let [a, b] = bar.ends.map(|p| self.at(&p));

@@ -58,9 +58,9 @@ fn process(out: &mut String, part: &Laid) {
     line("least wall", Some(format!("{} mm", p.least_wall_mm)));
     line(
         "clearance of moving parts",
-        Some(format!("{} mm; no supports and no brim in these gaps", p.clearance_mm)),
+        Some(format!("{} mm", p.clearance_mm)),
     );
-    line("E reckoned with", Some(format!("{} MPa", m.e_mpa)));
+    line("E the design counts on", Some(format!("{} MPa", m.e_mpa)));
     out.push('\n');
 }
 
