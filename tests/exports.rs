@@ -268,8 +268,8 @@ mechanism wrist {
     ground base { B, O }
     link   fore { O, Q }
     link   hand { Q, P }
-    hinge nod:  base to fore at O axis z as crossed_leaves
-    hinge turn: fore to hand at Q axis (0, 1, 0) as crossed_leaves
+    hinge nod:  base to fore at O axis z into base toward B as crossed_leaves
+    hinge turn: fore to hand at Q axis (0, 1, 0) into hand toward P as crossed_leaves
     material petg
     print on fdm
     cycle 2 steps over 1 s

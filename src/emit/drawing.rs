@@ -35,7 +35,8 @@ pub fn svg_drawing(scene: &Scene) -> String {
         ],
     };
     views.iter_mut().for_each(|v| v.measure(scene));
-    let size = |k: usize, views: &[View]| views.iter().map(|v| v.bounds[1][k] - v.bounds[0][k]).fold(0.0, f64::max);
+    let size =
+        |k: usize, views: &[View]| views.iter().map(|v| v.bounds[1][k] - v.bounds[0][k]).fold(0.0, f64::max);
     let letter = LETTERS * size(0, &views).max(size(1, &views)) * if views.len() > 1 { 1.8 } else { 1.0 };
     let gap = 5.0 * letter;
     if let [front, above, right] = views.as_mut_slice() {
@@ -53,16 +54,21 @@ pub fn svg_drawing(scene: &Scene) -> String {
          font-family=\"sans-serif\" font-size=\"{}\">\n<title>{}, at rest, in mm</title>\n\
          <rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"white\"/>\n",
         PAGE * height / width,
-        mm(x), mm(y), mm(width), mm(height), mm(letter), escaped(&scene.name),
-        mm(x), mm(y), mm(width), mm(height),
+        mm(x),
+        mm(y),
+        mm(width),
+        mm(height),
+        mm(letter),
+        escaped(&scene.name),
+        mm(x),
+        mm(y),
+        mm(width),
+        mm(height),
     );
     for view in &views {
         view.draw(scene, letter, views.len() > 1, &mut out);
     }
-    let legend = format!(
-        "{} at rest, mm · trace red, target blue · flexures green",
-        escaped(&scene.name)
-    );
+    let legend = format!("{} at rest, mm · trace red, target blue · flexures green", escaped(&scene.name));
     let at = [low[0] - margin + letter, -low[1] + margin + letter];
     let _ = writeln!(out, "<text x=\"{}\" y=\"{}\" fill=\"#444\">{legend}</text>", mm(at[0]), mm(at[1]));
     out.push_str("</svg>\n");
@@ -107,11 +113,16 @@ impl View {
         let _ = writeln!(out, "<g stroke-linecap=\"round\" stroke-linejoin=\"round\" fill=\"none\">");
         for outline in &scene.outlines {
             let colour = if outline.ground { "#b9bcc2" } else { "#cfd8e6" };
-            let _ = writeln!(out, "<g stroke=\"{colour}\" opacity=\"0.8\"><title>{}</title>", escaped(&outline.name));
+            let _ = writeln!(
+                out,
+                "<g stroke=\"{colour}\" opacity=\"0.8\"><title>{}</title>",
+                escaped(&outline.name)
+            );
             let mut lines: Vec<String> = Vec::new();
             for bar in &outline.bars {
                 let [a, b] = bar.ends.map(|p| self.at(&p));
-                let line = format!("<path d=\"{}\" stroke-width=\"{}\"/>", path(&[a, b]), mm(2.0 * bar.radius_mm));
+                let line =
+                    format!("<path d=\"{}\" stroke-width=\"{}\"/>", path(&[a, b]), mm(2.0 * bar.radius_mm));
                 if !lines.contains(&line) {
                     lines.push(line);
                 }
@@ -123,9 +134,11 @@ impl View {
             let points: Vec<[f64; 2]> = ribbon.rest.iter().map(|f| self.at(&f.origin)).collect();
             let _ = writeln!(
                 out,
-                "<path d=\"{}\" stroke=\"#1f8a4c\" stroke-width=\"{}\" stroke-linecap=\"butt\"><title>{}</title></path>",
+                "<path d=\"{}\" stroke=\"#1f8a4c\" stroke-width=\"{}\" stroke-linecap=\"butt\" opacity=\"{}\"><title>{}</title></path>",
                 path(&points),
                 mm(self.thickness(ribbon)),
+                // A leaf seen on its wide side does not hide what is behind.
+                if self.thickness(ribbon) > 3.0 * thin(ribbon) { "0.45" } else { "1" },
                 escaped(&ribbon.name)
             );
         }
@@ -147,6 +160,8 @@ impl View {
             }
         }
         out.push_str("</g>\n<g fill=\"#222\" text-anchor=\"middle\">\n");
+        // Joints at one place share a name; other views than the first have the marks alone.
+        let mut named: Vec<([f64; 2], f64, Vec<&str>)> = Vec::new();
         for mark in &scene.marks {
             let [x, y] = self.at(&mark.at);
             let (r, fill) = match mark.bore_mm {
@@ -156,31 +171,49 @@ impl View {
             let _ = writeln!(
                 out,
                 "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" fill=\"{fill}\" stroke=\"#222\" stroke-width=\"{}\"/>",
-                mm(x), mm(y), mm(r), mm(letter * 0.08)
+                mm(x),
+                mm(y),
+                mm(r),
+                mm(letter * 0.08)
             );
-            let _ = writeln!(
-                out,
-                "<text x=\"{}\" y=\"{}\">{}</text>",
-                mm(x), mm(y - r - 0.45 * letter), escaped(&mark.name)
-            );
+            match named.iter_mut().find(|(at, ..)| (at[0] - x).hypot(at[1] - y) < letter) {
+                Some((_, most, names)) => {
+                    *most = most.max(r);
+                    names.push(&mark.name);
+                }
+                None => named.push(([x, y], r, vec![&mark.name])),
+            }
+        }
+        for ([x, y], r, names) in named.iter().filter(|_| matches!(self.title, "" | "front")) {
+            let text = escaped(&names.join(", "));
+            let _ = writeln!(out, "<text x=\"{}\" y=\"{}\">{text}</text>", mm(*x), mm(y - r - 0.45 * letter));
         }
         self.lengths(scene, letter, out);
         out.push_str("</g>\n");
         self.overall(letter, out);
         if titled {
             let at = [self.bounds[0][0] + self.shift[0], -(self.bounds[1][1] + self.shift[1]) - 1.2 * letter];
-            let _ = writeln!(out, "<text x=\"{}\" y=\"{}\" fill=\"#444\">{}</text>", mm(at[0]), mm(at[1]), self.title);
+            let _ = writeln!(
+                out,
+                "<text x=\"{}\" y=\"{}\" fill=\"#444\">{}</text>",
+                mm(at[0]),
+                mm(at[1]),
+                self.title
+            );
         }
     }
 
     /// How thick a flexure looks from here, at its middle.
     fn thickness(&self, ribbon: &Ribbon) -> f64 {
         let k = ribbon.rest.len() / 2;
-        let (Some(frame), Some([a, b])) = (ribbon.rest.get(k), ribbon.half_widths_mm.get(k)) else { return 0.5 };
+        let (Some(frame), Some([a, b])) = (ribbon.rest.get(k), ribbon.half_widths_mm.get(k)) else {
+            return 0.5;
+        };
         let towards = self.right.cross(&self.up);
         let way = frame.rotation.column(2).into_owned();
         let across = towards.cross(&way).try_normalize(1e-6).unwrap_or(self.right);
-        let half = (a * frame.rotation.column(0).dot(&across)).hypot(b * frame.rotation.column(1).dot(&across));
+        let half =
+            (a * frame.rotation.column(0).dot(&across)).hypot(b * frame.rotation.column(1).dot(&across));
         2.0 * half
     }
 
@@ -204,7 +237,9 @@ impl View {
                 }
                 let line = format!(
                     "<text transform=\"translate({} {}) rotate({turn:.1})\" y=\"{}\" fill=\"#666\">{length:.1}</text>",
-                    mm(x), mm(y), mm(0.35 * letter)
+                    mm(x),
+                    mm(y),
+                    mm(0.35 * letter)
                 );
                 if !told.contains(&line) {
                     told.push(line);
@@ -241,14 +276,24 @@ impl View {
         let _ = writeln!(
             out,
             "<text x=\"{}\" y=\"{}\">{:.1}</text>",
-            mm((left + right) / 2.0), mm(y + 1.2 * letter), right - left
+            mm((left + right) / 2.0),
+            mm(y + 1.2 * letter),
+            right - left
         );
         let _ = writeln!(
             out,
             "<text transform=\"translate({} {}) rotate(-90)\">{:.1}</text>\n</g>",
-            mm(x - 0.5 * letter), mm((top + bottom) / 2.0), bottom - top
+            mm(x - 0.5 * letter),
+            mm((top + bottom) / 2.0),
+            bottom - top
         );
     }
+}
+
+/// The least thickness of a flexure at its middle, mm.
+fn thin(ribbon: &Ribbon) -> f64 {
+    let half = ribbon.half_widths_mm.get(ribbon.half_widths_mm.len() / 2);
+    half.map_or(0.0, |[a, b]| 2.0 * a.min(*b))
 }
 
 /// Two decimals, without a sign of zero and without zeros at the end.

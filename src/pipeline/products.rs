@@ -64,7 +64,9 @@ pub fn artefacts(built: &Built<'_>) -> (Vec<Artefact>, Vec<Diagnostic>) {
         for part in printed {
             match stl_bytes(&part.mesh) {
                 Ok(bytes) => out.push(Artefact { name: format!("{}.stl", part.name), bytes }),
-                Err(e) => found.push(Diagnostic::error("E0631", format!("no STL can be written: {e}"), part.at)),
+                Err(e) => {
+                    found.push(Diagnostic::error("E0631", format!("no STL can be written: {e}"), part.at))
+                }
             }
         }
     }
