@@ -154,7 +154,9 @@ fn the_leaves_of_the_part_are_as_thick_as_the_design_says() {
     let p: Vec<f64> = design.free.iter().map(|f| values[&f.path]).collect();
     let layout = Layout::new(design, &solve_motion(design, &p).unwrap(), &p);
     let model = Model::new(design, &layout, &p, 48, false).unwrap();
-    let base = solved().artefacts.iter().find(|a| a.name.ends_with("_base.stl")).unwrap();
+    // In the design's coordinates, not as it lies on the bed.
+    let (parts, _) = Compiler::default().mesh(design, &p).unwrap();
+    let base = parts.iter().find(|a| a.name.ends_with("_base.stl")).unwrap();
     let mesh = read_stl(&base.bytes);
     let probe = Probe::new(&mesh);
     for (rod, built) in design.rods.iter().zip(&model.rods) {

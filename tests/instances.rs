@@ -343,6 +343,11 @@ fn parameters_of_placed_mechanisms_are_set_by_their_names() {
     }
 }
 
+/// An assembly whose parts are written where they are in it, and not as they lie on a bed.
+fn in_place(text: &str) -> Assembly {
+    Assembly { exports: Vec::new(), ..assembly(text) }
+}
+
 fn meshes(out: &[Artefact]) -> Vec<(String, Mesh)> {
     out.iter()
         .map(|a| {
@@ -358,7 +363,7 @@ fn meshes(out: &[Artefact]) -> Vec<(String, Mesh)> {
 #[test]
 fn a_mirrored_half_with_a_ground_in_common_is_printed_as_one_part() {
     let text = include_str!("instances/butterfly.mech");
-    let a = assembly(text);
+    let a = in_place(text);
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
     let compiler = Compiler::default();
     let (artefacts, found) = compiler.parts(&a, &starts).unwrap();
@@ -688,7 +693,7 @@ fn sketches_are_those_of_the_motors() {
 #[test]
 fn halves_with_a_moving_body_in_common_are_printed_as_one_part() {
     // An arm so wide that the leaves of one half keep clear of the other.
-    let a = assembly(&CAR.replace("R = (14 mm, 24 mm)", "R = (20 mm, 24 mm)"));
+    let a = in_place(&CAR.replace("R = (14 mm, 24 mm)", "R = (20 mm, 24 mm)"));
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
     let (artefacts, found) = Compiler::default().parts(&a, &starts).unwrap();
     assert_eq!(found, []);

@@ -118,11 +118,11 @@ impl<'a> Evaluator<'a> {
                 };
                 Ok(Export { kind, origin: e.at })
             }
-            plain @ ("glb" | "3mf" | "sheet" | "svg" | "png") => {
+            plain @ ("glb" | "3mf" | "threemf" | "sheet" | "svg" | "png") => {
                 self.arguments(name, args, &[], 0)?;
                 let kind = match plain {
                     "glb" => ExportKind::Glb,
-                    "3mf" => ExportKind::ThreeMf,
+                    "3mf" | "threemf" => ExportKind::ThreeMf,
                     "sheet" => ExportKind::Sheet,
                     "svg" => ExportKind::Svg,
                     _ => ExportKind::Png,

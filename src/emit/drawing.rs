@@ -113,7 +113,11 @@ impl View {
         let _ = writeln!(out, "<g stroke-linecap=\"round\" stroke-linejoin=\"round\" fill=\"none\">");
         for outline in &scene.outlines {
             let colour = if outline.ground { "#b9bcc2" } else { "#cfd8e6" };
-            let _ = writeln!(out, "<g stroke=\"{colour}\"><title>{}</title>", escaped(&outline.name));
+            let _ = writeln!(
+                out,
+                "<g stroke=\"{colour}\" opacity=\"0.8\"><title>{}</title>",
+                escaped(&outline.name)
+            );
             let mut lines: Vec<String> = Vec::new();
             for bar in &outline.bars {
                 let [a, b] = bar.ends.map(|p| self.at(&p));
@@ -130,9 +134,11 @@ impl View {
             let points: Vec<[f64; 2]> = ribbon.rest.iter().map(|f| self.at(&f.origin)).collect();
             let _ = writeln!(
                 out,
-                "<path d=\"{}\" stroke=\"#1f8a4c\" stroke-width=\"{}\" stroke-linecap=\"butt\"><title>{}</title></path>",
+                "<path d=\"{}\" stroke=\"#1f8a4c\" stroke-width=\"{}\" stroke-linecap=\"butt\" opacity=\"{}\"><title>{}</title></path>",
                 path(&points),
                 mm(self.thickness(ribbon)),
+                // A leaf seen on its wide side does not hide what is behind.
+                if self.thickness(ribbon) > 3.0 * thin(ribbon) { "0.45" } else { "1" },
                 escaped(&ribbon.name)
             );
         }
@@ -154,6 +160,8 @@ impl View {
             }
         }
         out.push_str("</g>\n<g fill=\"#222\" text-anchor=\"middle\">\n");
+        // Joints at one place share a name; other views than the first have the marks alone.
+        let mut named: Vec<([f64; 2], f64, Vec<&str>)> = Vec::new();
         for mark in &scene.marks {
             let [x, y] = self.at(&mark.at);
             let (r, fill) = match mark.bore_mm {
@@ -168,13 +176,17 @@ impl View {
                 mm(r),
                 mm(letter * 0.08)
             );
-            let _ = writeln!(
-                out,
-                "<text x=\"{}\" y=\"{}\">{}</text>",
-                mm(x),
-                mm(y - r - 0.45 * letter),
-                escaped(&mark.name)
-            );
+            match named.iter_mut().find(|(at, ..)| (at[0] - x).hypot(at[1] - y) < letter) {
+                Some((_, most, names)) => {
+                    *most = most.max(r);
+                    names.push(&mark.name);
+                }
+                None => named.push(([x, y], r, vec![&mark.name])),
+            }
+        }
+        for ([x, y], r, names) in named.iter().filter(|_| matches!(self.title, "" | "front")) {
+            let text = escaped(&names.join(", "));
+            let _ = writeln!(out, "<text x=\"{}\" y=\"{}\">{text}</text>", mm(*x), mm(y - r - 0.45 * letter));
         }
         self.lengths(scene, letter, out);
         out.push_str("</g>\n");
@@ -276,6 +288,12 @@ impl View {
             bottom - top
         );
     }
+}
+
+/// The least thickness of a flexure at its middle, mm.
+fn thin(ribbon: &Ribbon) -> f64 {
+    let half = ribbon.half_widths_mm.get(ribbon.half_widths_mm.len() / 2);
+    half.map_or(0.0, |[a, b]| 2.0 * a.min(*b))
 }
 
 /// Two decimals, without a sign of zero and without zeros at the end.

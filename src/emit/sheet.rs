@@ -56,11 +56,8 @@ fn process(out: &mut String, part: &Laid) {
     line("lines", p.machine.line_mm.map(|x| format!("{x} mm wide")));
     line("bed", p.machine.bed_mm.map(|[x, y, z]| format!("{x} × {y} × {z} mm")));
     line("least wall", Some(format!("{} mm", p.least_wall_mm)));
-    line(
-        "clearance of moving parts",
-        Some(format!("{} mm; no supports and no brim in these gaps", p.clearance_mm)),
-    );
-    line("E reckoned with", Some(format!("{} MPa", m.e_mpa)));
+    line("clearance of moving parts", Some(format!("{} mm", p.clearance_mm)));
+    line("E the design counts on", Some(format!("{} MPa", m.e_mpa)));
     out.push('\n');
 }
 
@@ -81,6 +78,7 @@ fn lies(out: &mut String, part: &Laid) {
     let (count, leaning) = (part.flexures.len(), part.lying.leaning().count());
     let why = match (count, leaning) {
         (0, _) => "it has no flexures, lies low and on its largest face".to_string(),
+        (1, 0) => "so its flexure runs within the layers, and bending does not pull layers apart".to_string(),
         (n, 0) => {
             format!("so all its {n} flexures run within the layers, and bending does not pull layers apart")
         }

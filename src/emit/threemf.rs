@@ -28,11 +28,13 @@ pub fn threemf_bytes(plate: &Plate, thumbnail: &[u8]) -> Result<Vec<u8>, String>
             materials.push(&part.material.name);
         }
     }
-    let group = model.add_base_materials(|m| {
+    model.add_base_materials(|m| {
         for name in &materials {
             m.add_base(name, COLOUR);
         }
     });
+    // Numbers of resources are unique in a file; the builder counts materials and objects apart.
+    let group = plate.parts.len() as u32 + 1;
     let round = |x: f64| (x * DECIMALS).round() / DECIMALS + 0.0;
     for (part, [x, y]) in plate.parts.iter().zip(plate.places()) {
         let material = materials.iter().position(|m| *m == part.material.name).unwrap_or(0);
@@ -48,15 +50,22 @@ pub fn threemf_bytes(plate: &Plate, thumbnail: &[u8]) -> Result<Vec<u8>, String>
             })
             .map_err(|e| text(&e))?;
         let (x, y) = (round(x), round(y));
+        // Rows of the matrix that is applied to columns.
+        let place = [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
         model
             .add_build_item_advanced(object, |item| {
-                item.partnumber(&part.name)
-                    .transform(&[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, x, y, 0.0, 1.0]);
+                item.partnumber(&part.name).transform(&place);
             })
             .map_err(|e| text(&e))?;
     }
+    let mut model = model.build().map_err(|e| text(&e))?;
+    for base in &mut model.resources.basematerials {
+        base.id = group;
+    }
+    // Plain materials belong to the core of the format; the builder demands their extension.
+    model.requiredextensions = model.recommendedextensions.clone();
     let mut package = ThreemfPackageBuilder::new();
-    package.set_root_model(model.build().map_err(|e| text(&e))?);
+    package.set_root_model(model);
     package.add_thumbnail("/Metadata/thumbnail.png", thumbnail.to_vec()).map_err(|e| text(&e))?;
     let mut out = Cursor::new(Vec::new());
     package.build().map_err(|e| text(&e))?.write(&mut out).map_err(|e| text(&e))?;

@@ -11,8 +11,10 @@ use nalgebra::{Matrix3, Vector3};
 const IN_LAYER: f64 = 0.05;
 /// Sine of the angle by which the width of a flexure may lean.
 const UPRIGHT: f64 = 0.1;
-/// Directions nearer than this (sine) are one candidate.
-const SAME: f64 = 0.02;
+/// Directions nearer than this (sine) are one candidate: a part is not tilted by three degrees for a flexure's sake.
+const SAME: f64 = 0.06;
+/// Angles out of the layers are compared, summed, in steps of this, rad: what is drawn upright stays so where little is won.
+const LEAN_STEP: f64 = 0.1;
 /// Directions that are tried at most: those that more of a part's flexures ask for come first.
 const CANDIDATES: usize = 48;
 /// Faces this near to the bed rest on it, mm: bosses stay 0.02 mm, bars 0.25 mm below a layer's face.
@@ -81,7 +83,7 @@ pub fn lie(mesh: &Mesh, flexures: &[&FlexureSolid], bed_mm: Option<[f64; 3]>) ->
         let whole = |x: f64, step: f64| (x / step).round() as i64;
         let key = vec![
             leaning.len() as i64,
-            whole(leaning.iter().sum::<f64>(), 0.02),
+            whole(leaning.iter().sum::<f64>(), LEAN_STEP),
             -(standing as i64),
             whole(high - low, EQUAL_MM),
             -whole(contact(mesh, up, low), 1.0),

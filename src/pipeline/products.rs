@@ -60,6 +60,16 @@ pub fn artefacts(built: &Built<'_>) -> (Vec<Artefact>, Vec<Diagnostic>) {
             }
         }
     }
+    if !assembly.exports.iter().any(|e| e.export.kind.of_solids()) {
+        for part in printed {
+            match stl_bytes(&part.mesh) {
+                Ok(bytes) => out.push(Artefact { name: format!("{}.stl", part.name), bytes }),
+                Err(e) => {
+                    found.push(Diagnostic::error("E0631", format!("no STL can be written: {e}"), part.at))
+                }
+            }
+        }
+    }
     if let Some(plate) = laid.get() {
         found.extend(lay::findings(assembly, plate, printed));
     }
@@ -82,7 +92,7 @@ fn files<'s>(
     match kind {
         ExportKind::Stl => plate().parts.iter().map(|p| stl(&format!("{}.stl", p.name), &p.mesh)).collect(),
         ExportKind::StlAssembled => {
-            printed.iter().map(|p| stl(&format!("{}.assembled.stl", p.name), &p.mesh)).collect()
+            printed.iter().map(|p| stl(&format!("assembled/{}.stl", p.name), &p.mesh)).collect()
         }
         ExportKind::Glb => {
             let bytes = glb_bytes(scene()).map_err(|e| e.to_string());

@@ -154,8 +154,8 @@ pub trait Stages {
         cancel: &AtomicBool,
     ) -> Result<Solved, Failed>;
 
-    /// One file a printed part of the whole assembly, and findings that do not stop the work. `values` are those of
-    /// each design.
+    /// The files of printed parts that the assembly's exports ask for, and findings that do not stop the work; where they
+    /// ask for none, an STL a part in the rest pose of the assembly. `values` are those of each design.
     ///
     /// # Errors
     /// Where no closed solid comes out.
@@ -165,11 +165,12 @@ pub trait Stages {
         values: &[Vec<f64>],
     ) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed>;
 
-    /// The same of a mechanism by itself.
+    /// An STL a printed part of a mechanism by itself, in its own coordinates.
     ///
     /// # Errors
     /// Where no closed solid comes out.
     fn mesh(&self, design: &Design, values: &[f64]) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
-        self.parts(&Assembly::of(design.clone()), &[values.to_vec()])
+        let assembly = Assembly { exports: Vec::new(), ..Assembly::of(design.clone()) };
+        self.parts(&assembly, &[values.to_vec()])
     }
 }

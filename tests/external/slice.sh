@@ -13,7 +13,9 @@ for row in 'Edges fixed' 'Facets removed' 'Facets added' 'Facets reversed' 'Back
         exit 1
     fi
 done
-HOME=$work prusa-slicer --export-gcode --center 100,100 --output "$work/part.gcode" "$part" >"$work/slicer" 2>&1 ||
+# A bed on which every part fits.
+HOME=$work prusa-slicer --export-gcode --bed-shape 0x0,500x0,500x500,0x500 --max-print-height 500 \
+    --center 250,250 --output "$work/part.gcode" "$part" >"$work/slicer" 2>&1 ||
     { cat "$work/slicer"; exit 1; }
 if grep -iE 'repair|open edge|non-manifold|error' "$work/slicer"; then
     echo "$part: PrusaSlicer had to repair it"
