@@ -93,7 +93,8 @@ fn every_rule_finds_what_it_is_for_and_nothing_in_a_sound_design() {
         let mut places: Vec<_> = found.iter().map(|d| place(d, &out)).collect();
         places.sort();
         if places != wanted || !errors(&out).is_empty() {
-            let told: Vec<_> = out.diagnostics.iter().map(|d| format!("  {} {}", d.code, d.message)).collect();
+            let told: Vec<_> =
+                out.diagnostics.iter().map(|d| format!("  {} {}", d.code, d.message)).collect();
             failures.push(format!("{code} bad: {places:?}, wanted {wanted:?}\n{}", told.join("\n")));
         }
         for d in &found {
@@ -117,8 +118,12 @@ fn every_repair_compiles_and_takes_its_finding_away() {
         let code = entry.rule.code;
         let (bad, _) = pair(entry);
         let out = run(&bad, entry.rule.stage(), Levels::default());
-        let fixes: Vec<_> =
-            out.diagnostics.iter().filter(|d| d.code == code).flat_map(|d| d.fixes.iter().map(move |f| (d, f))).collect();
+        let fixes: Vec<_> = out
+            .diagnostics
+            .iter()
+            .filter(|d| d.code == code)
+            .flat_map(|d| d.fixes.iter().map(move |f| (d, f)))
+            .collect();
         for (d, fix) in &fixes {
             repaired.push(code);
             let new = apply(&out.sources, [*fix]);
@@ -130,10 +135,14 @@ fn every_repair_compiles_and_takes_its_finding_away() {
             assert!(left < before, "{code}: `{}` does not take away: {}\n{}", fix.title, d.message, new[0].1);
         }
         // What the page says of repairs holds.
-        let page = entry.page();
+        let page = entry.page().split_whitespace().collect::<Vec<_>>().join(" ");
         let says = |word: &str| page.contains(word);
         assert_eq!(fixes.iter().any(|(_, f)| f.safe), says("`--fix`"), "{code}: the page and safe repairs");
-        assert_eq!(fixes.iter().any(|(_, f)| !f.safe), says("`--unsafe-fixes`"), "{code}: the page and risky repairs");
+        assert_eq!(
+            fixes.iter().any(|(_, f)| !f.safe),
+            says("`--unsafe-fixes`"),
+            "{code}: the page and risky repairs"
+        );
         assert_eq!(fixes.is_empty(), says("no repair by itself"), "{code}: the page and no repair");
     }
     repaired.dedup();
@@ -192,14 +201,19 @@ fn an_allow_covers_its_statement_its_block_or_its_file() {
     assert_eq!(told(&block), "", "set apart it covers the mechanism");
     let file = text.replacen("use std", "allow W1001 \"later\"\n\nuse std", 1);
     assert_eq!(told(&file), "", "outside of blocks the file");
-    let needless = block.replace(UNUSED.lines().next().unwrap(), "").replace(UNUSED.lines().nth(1).unwrap(), "");
+    let needless =
+        block.replace(UNUSED.lines().next().unwrap(), "").replace(UNUSED.lines().nth(1).unwrap(), "");
     assert_eq!(told(&needless), "W1000", "{needless}");
     // What only a build looks for is not judged by a check.
     let later = text.replace("    point X", "    allow W1301 \"later\"\n\n    point X");
     assert_eq!(told(&later), "W1001 W1001");
     let error = |text: &str| {
         let out = run(text, Stage::Flexures, Levels::default());
-        out.diagnostics.iter().filter(|d| d.is_error()).map(|d| (d.code.clone(), place(d, &out).1)).collect::<Vec<_>>()
+        out.diagnostics
+            .iter()
+            .filter(|d| d.is_error())
+            .map(|d| (d.code.clone(), place(d, &out).1))
+            .collect::<Vec<_>>()
     };
     assert_eq!(error(&block.replace("W1001", "W1999")), [("E0117".to_string(), "W1999".to_string())]);
     assert_eq!(error(&block.replace("W1001", "E0101")), [("E0117".to_string(), "E0101".to_string())]);
@@ -210,7 +224,8 @@ fn an_allow_covers_its_statement_its_block_or_its_file() {
 fn levels_of_flags_and_configuration() {
     let text = two_unused();
     let with = |flags: &[(&str, Level)], config: &[(&str, Level)]| {
-        let list = |l: &[(&str, Level)]| l.iter().map(|(s, l)| (s.parse::<Selector>().unwrap(), *l)).collect();
+        let list =
+            |l: &[(&str, Level)]| l.iter().map(|(s, l)| (s.parse::<Selector>().unwrap(), *l)).collect();
         let levels = Levels { flags: list(flags), config: list(config), baseline: None };
         let out = run(&text, Stage::Flexures, levels);
         let found = out.diagnostics.iter().filter(|d| d.code == "W1001");
@@ -220,10 +235,17 @@ fn levels_of_flags_and_configuration() {
     assert_eq!(with(&[("warnings", Level::Deny)], &[]), (2, 2));
     assert_eq!(with(&[("W1001", Level::Allow)], &[]), (0, 0));
     assert_eq!(with(&[("unused-point", Level::Allow)], &[]), (0, 0), "by its name");
-    assert_eq!(with(&[("warnings", Level::Deny), ("W1001", Level::Warn)], &[]), (0, 2), "one goes before many");
+    assert_eq!(
+        with(&[("warnings", Level::Deny), ("W1001", Level::Warn)], &[]),
+        (0, 2),
+        "one goes before many"
+    );
     assert_eq!(with(&[], &[("W1001", Level::Deny)]), (2, 2));
     assert_eq!(with(&[("all", Level::Warn)], &[("W1001", Level::Deny)]), (0, 2), "flags go before the file");
-    assert!("E0101".parse::<Selector>().is_err() && "W10011".parse::<Selector>().unwrap_err().contains("did you mean"));
+    assert!(
+        "E0101".parse::<Selector>().is_err()
+            && "W10011".parse::<Selector>().unwrap_err().contains("did you mean")
+    );
 }
 
 #[test]
@@ -274,4 +296,93 @@ fn repairs_of_other_findings_compile() {
         let left: Vec<_> = after.diagnostics.iter().filter(|d| d.code == code || d.is_error()).collect();
         assert!(left.is_empty(), "{code}: {left:?}\n{}", new[0].1);
     }
+}
+
+/// `flexura` with these arguments in a folder: exit code, standard output, standard error.
+fn flexura(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_flexura"));
+    let out = command.current_dir(folder).args(arguments).output().unwrap();
+    let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
+    (out.status.code().unwrap(), text(&out.stdout), text(&out.stderr))
+}
+
+#[test]
+fn the_command_repairs_files_and_knows_configuration_and_baseline() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let source = at.join("main.mech");
+    let risky = "drive motor from 0 deg to 360 deg with nema17\n    rest  motor at 30 deg";
+    let text = two_unused().replace(risky, "drive motor from 0 deg to 360 deg with nema17");
+    std::fs::write(&source, &text).unwrap();
+
+    let (code, _, told) = flexura(at, &["check", "main.mech", "--deny", "warnings"]);
+    assert!(code == 1 && told.contains("W1001") && told.contains("`check --fix` does it"), "{told}");
+    let (code, _, told) = flexura(at, &["check", "main.mech", "--deny", "W1001x"]);
+    assert!(code == 2 && told.contains("did you mean `W1001`?"), "{told}");
+
+    // What is known is not told again.
+    let (code, _, told) = flexura(at, &["check", "main.mech", "--write-baseline", "known.json"]);
+    assert!(code == 0 && told.contains("known from now on"), "{told}");
+    let (code, _, told) = flexura(at, &["check", "main.mech", "--baseline", "known.json", "--deny", "warnings"]);
+    assert_eq!(code, 0, "{told}");
+    std::fs::write(at.join("bad.json"), "{}").unwrap();
+    let (code, _, told) = flexura(at, &["check", "main.mech", "--baseline", "bad.json"]);
+    assert!(code == 1 && told.contains("E0742"), "{told}");
+
+    // The configuration beside it.
+    std::fs::write(at.join("flexura.toml"), "[lints]\nwarnings = \"deny\"\n").unwrap();
+    assert_eq!(flexura(at, &["check", "main.mech"]).0, 1);
+    std::fs::write(at.join("flexura.toml"), "[lints]\nwarnings = \"dny\"\n").unwrap();
+    let (code, _, told) = flexura(at, &["check", "main.mech"]);
+    assert!(code == 1 && told.contains("E0741") && told.contains("dny"), "{told}");
+    std::fs::remove_file(at.join("flexura.toml")).unwrap();
+
+    // Safe repairs first, then the others.
+    let (code, _, told) = flexura(at, &["check", "main.mech", "--fix"]);
+    assert!(code == 0 && told.contains("2 repaired") && !told.contains("W1001"), "{told}");
+    let fixed = std::fs::read_to_string(&source).unwrap();
+    assert_eq!(fixed, text.replace(UNUSED, ""));
+    std::fs::write(&source, fixed.replace("{ O, D }", "{ O, Dd }").replace("point P =", "point P  =")).unwrap();
+    let before = std::fs::read_to_string(&source).unwrap();
+    let (code, _, _) = flexura(at, &["check", "main.mech", "--fix"]);
+    assert!(code == 1 && std::fs::read_to_string(&source).unwrap() == before, "a guess is not safe");
+    let (code, _, told) = flexura(at, &["check", "main.mech", "--unsafe-fixes"]);
+    let after = std::fs::read_to_string(&source).unwrap();
+    assert!(code == 0 && after.contains("{ O, D }") && after.contains("point P  ="), "{told}\n{after}");
+    let names: Vec<_> = std::fs::read_dir(at).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(names.len(), 3, "nothing is left beside the files: {names:?}");
+}
+
+#[test]
+fn the_command_explains() {
+    let here = folder();
+    let (code, page, _) = flexura(&here, &["explain", "W1107"]);
+    assert!(code == 0 && page.starts_with("W1107 better-rest: ") && page.contains("Why it matters"), "{page}");
+    assert_eq!(flexura(&here, &["explain", "better-rest"]).1, page);
+    let (code, list, _) = flexura(&here, &["explain", "--list", "--format", "json"]);
+    let list: serde_json::Value = serde_json::from_str(&list).unwrap();
+    assert_eq!((code, list["codes"].as_array().unwrap().len()), (0, explain::codes().count()));
+    let (code, one, _) = flexura(&here, &["explain", "e0101", "--format", "json"]);
+    let one: serde_json::Value = serde_json::from_str(&one).unwrap();
+    assert_eq!((code, one["code"].as_str(), one["severity"].as_str()), (0, Some("E0101"), Some("error")));
+    let (code, _, told) = flexura(&here, &["explain", "W1170"]);
+    assert!(code == 1 && told.contains("did you mean"), "{told}");
+}
+
+/// With their locks, so that what the solution shows counts too.
+#[test]
+fn the_examples_are_free_of_warnings() {
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let mut count = 0;
+    for entry in std::fs::read_dir(&examples).unwrap() {
+        for file in std::fs::read_dir(entry.unwrap().path()).unwrap() {
+            let path = file.unwrap().path();
+            if path.extension().is_some_and(|e| e == "mech") {
+                count += 1;
+                let (code, _, told) = flexura(&examples, &["check", path.to_str().unwrap(), "--deny", "warnings"]);
+                assert_eq!(code, 0, "{}\n{told}", path.display());
+            }
+        }
+    }
+    assert_eq!(count, 8);
 }
