@@ -323,7 +323,8 @@ fn the_command_repairs_files_and_knows_configuration_and_baseline() {
     // What is known is not told again.
     let (code, _, told) = flexura(at, &["check", "main.mech", "--write-baseline", "known.json"]);
     assert!(code == 0 && told.contains("known from now on"), "{told}");
-    let (code, _, told) = flexura(at, &["check", "main.mech", "--baseline", "known.json", "--deny", "warnings"]);
+    let (code, _, told) =
+        flexura(at, &["check", "main.mech", "--baseline", "known.json", "--deny", "warnings"]);
     assert_eq!(code, 0, "{told}");
     std::fs::write(at.join("bad.json"), "{}").unwrap();
     let (code, _, told) = flexura(at, &["check", "main.mech", "--baseline", "bad.json"]);
@@ -342,7 +343,8 @@ fn the_command_repairs_files_and_knows_configuration_and_baseline() {
     assert!(code == 0 && told.contains("2 repaired") && !told.contains("W1001"), "{told}");
     let fixed = std::fs::read_to_string(&source).unwrap();
     assert_eq!(fixed, text.replace(UNUSED, ""));
-    std::fs::write(&source, fixed.replace("{ O, D }", "{ O, Dd }").replace("point P =", "point P  =")).unwrap();
+    std::fs::write(&source, fixed.replace("{ O, D }", "{ O, Dd }").replace("point P =", "point P  ="))
+        .unwrap();
     let before = std::fs::read_to_string(&source).unwrap();
     let (code, _, _) = flexura(at, &["check", "main.mech", "--fix"]);
     assert!(code == 1 && std::fs::read_to_string(&source).unwrap() == before, "a guess is not safe");
@@ -357,7 +359,10 @@ fn the_command_repairs_files_and_knows_configuration_and_baseline() {
 fn the_command_explains() {
     let here = folder();
     let (code, page, _) = flexura(&here, &["explain", "W1107"]);
-    assert!(code == 0 && page.starts_with("W1107 better-rest: ") && page.contains("Why it matters"), "{page}");
+    assert!(
+        code == 0 && page.starts_with("W1107 better-rest: ") && page.contains("Why it matters"),
+        "{page}"
+    );
     assert_eq!(flexura(&here, &["explain", "better-rest"]).1, page);
     let (code, list, _) = flexura(&here, &["explain", "--list", "--format", "json"]);
     let list: serde_json::Value = serde_json::from_str(&list).unwrap();
@@ -379,7 +384,8 @@ fn the_examples_are_free_of_warnings() {
             let path = file.unwrap().path();
             if path.extension().is_some_and(|e| e == "mech") {
                 count += 1;
-                let (code, _, told) = flexura(&examples, &["check", path.to_str().unwrap(), "--deny", "warnings"]);
+                let (code, _, told) =
+                    flexura(&examples, &["check", path.to_str().unwrap(), "--deny", "warnings"]);
                 assert_eq!(code, 0, "{}\n{told}", path.display());
             }
         }
