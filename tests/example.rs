@@ -5,6 +5,7 @@
 mod common;
 
 use common::{ExampleFiles, example, table};
+use flexura::diagnostic::Severity;
 use flexura::elaborate::{FileError, Files};
 use flexura::equilibrium::{Layout, Model};
 use flexura::geometry::{Mesh, Probe, check_mesh};
@@ -92,7 +93,9 @@ fn its_tree_loses_nothing() {
 fn it_has_no_errors() {
     let out = pipeline::check(&request(), &Compiler::default(), &ExampleFiles);
     assert_eq!(out.diagnostics, [], "the check");
-    let findings: Vec<_> = solved().diagnostics.iter().map(|d| (&d.code, &d.message)).collect();
+    // That values rest on their bounds is worth knowing, no more.
+    let grave = solved().diagnostics.iter().filter(|d| d.severity > Severity::Advice);
+    let findings: Vec<_> = grave.map(|d| (&d.code, &d.message)).collect();
     assert!(findings.is_empty(), "the build: {findings:?}");
 }
 

@@ -135,7 +135,7 @@ fn every_repair_compiles_and_takes_its_finding_away() {
             assert!(left < before, "{code}: `{}` does not take away: {}\n{}", fix.title, d.message, new[0].1);
         }
         // What the page says of repairs holds.
-        let page = entry.page();
+        let page = entry.page().split_whitespace().collect::<Vec<_>>().join(" ");
         let says = |word: &str| page.contains(word);
         assert_eq!(fixes.iter().any(|(_, f)| f.safe), says("`--fix`"), "{code}: the page and safe repairs");
         assert_eq!(
@@ -296,4 +296,99 @@ fn repairs_of_other_findings_compile() {
         let left: Vec<_> = after.diagnostics.iter().filter(|d| d.code == code || d.is_error()).collect();
         assert!(left.is_empty(), "{code}: {left:?}\n{}", new[0].1);
     }
+}
+
+/// `flexura` with these arguments in a folder: exit code, standard output, standard error.
+fn flexura(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_flexura"));
+    let out = command.current_dir(folder).args(arguments).output().unwrap();
+    let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
+    (out.status.code().unwrap(), text(&out.stdout), text(&out.stderr))
+}
+
+#[test]
+fn the_command_repairs_files_and_knows_configuration_and_baseline() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let source = at.join("main.mech");
+    let risky = "drive motor from 0 deg to 360 deg with nema17\n    rest  motor at 30 deg";
+    let text = two_unused().replace(risky, "drive motor from 0 deg to 360 deg with nema17");
+    std::fs::write(&source, &text).unwrap();
+
+    let (code, _, told) = flexura(at, &["check", "main.mech", "--deny", "warnings"]);
+    assert!(code == 1 && told.contains("W1001") && told.contains("`check --fix` does it"), "{told}");
+    let (code, _, told) = flexura(at, &["check", "main.mech", "--deny", "W1001x"]);
+    assert!(code == 2 && told.contains("did you mean `W1001`?"), "{told}");
+
+    // What is known is not told again.
+    let (code, _, told) = flexura(at, &["check", "main.mech", "--write-baseline", "known.json"]);
+    assert!(code == 0 && told.contains("known from now on"), "{told}");
+    let (code, _, told) =
+        flexura(at, &["check", "main.mech", "--baseline", "known.json", "--deny", "warnings"]);
+    assert_eq!(code, 0, "{told}");
+    std::fs::write(at.join("bad.json"), "{}").unwrap();
+    let (code, _, told) = flexura(at, &["check", "main.mech", "--baseline", "bad.json"]);
+    assert!(code == 1 && told.contains("E0742"), "{told}");
+
+    // The configuration beside it.
+    std::fs::write(at.join("flexura.toml"), "[lints]\nwarnings = \"deny\"\n").unwrap();
+    assert_eq!(flexura(at, &["check", "main.mech"]).0, 1);
+    std::fs::write(at.join("flexura.toml"), "[lints]\nwarnings = \"dny\"\n").unwrap();
+    let (code, _, told) = flexura(at, &["check", "main.mech"]);
+    assert!(code == 1 && told.contains("E0741") && told.contains("dny"), "{told}");
+    std::fs::remove_file(at.join("flexura.toml")).unwrap();
+
+    // Safe repairs first, then the others.
+    let (code, _, told) = flexura(at, &["check", "main.mech", "--fix"]);
+    assert!(code == 0 && told.contains("2 repaired") && !told.contains("W1001"), "{told}");
+    let fixed = std::fs::read_to_string(&source).unwrap();
+    assert_eq!(fixed, text.replace(UNUSED, ""));
+    std::fs::write(&source, fixed.replace("{ O, D }", "{ O, Dd }").replace("point P =", "point P  ="))
+        .unwrap();
+    let before = std::fs::read_to_string(&source).unwrap();
+    let (code, _, _) = flexura(at, &["check", "main.mech", "--fix"]);
+    assert!(code == 1 && std::fs::read_to_string(&source).unwrap() == before, "a guess is not safe");
+    let (code, _, told) = flexura(at, &["check", "main.mech", "--unsafe-fixes"]);
+    let after = std::fs::read_to_string(&source).unwrap();
+    assert!(code == 0 && after.contains("{ O, D }") && after.contains("point P  ="), "{told}\n{after}");
+    let names: Vec<_> = std::fs::read_dir(at).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(names.len(), 3, "nothing is left beside the files: {names:?}");
+}
+
+#[test]
+fn the_command_explains() {
+    let here = folder();
+    let (code, page, _) = flexura(&here, &["explain", "W1107"]);
+    assert!(
+        code == 0 && page.starts_with("W1107 better-rest: ") && page.contains("Why it matters"),
+        "{page}"
+    );
+    assert_eq!(flexura(&here, &["explain", "better-rest"]).1, page);
+    let (code, list, _) = flexura(&here, &["explain", "--list", "--format", "json"]);
+    let list: serde_json::Value = serde_json::from_str(&list).unwrap();
+    assert_eq!((code, list["codes"].as_array().unwrap().len()), (0, explain::codes().count()));
+    let (code, one, _) = flexura(&here, &["explain", "e0101", "--format", "json"]);
+    let one: serde_json::Value = serde_json::from_str(&one).unwrap();
+    assert_eq!((code, one["code"].as_str(), one["severity"].as_str()), (0, Some("E0101"), Some("error")));
+    let (code, _, told) = flexura(&here, &["explain", "W1170"]);
+    assert!(code == 1 && told.contains("did you mean"), "{told}");
+}
+
+/// With their locks, so that what the solution shows counts too.
+#[test]
+fn the_examples_are_free_of_warnings() {
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let mut count = 0;
+    for entry in std::fs::read_dir(&examples).unwrap() {
+        for file in std::fs::read_dir(entry.unwrap().path()).unwrap() {
+            let path = file.unwrap().path();
+            if path.extension().is_some_and(|e| e == "mech") {
+                count += 1;
+                let (code, _, told) =
+                    flexura(&examples, &["check", path.to_str().unwrap(), "--deny", "warnings"]);
+                assert_eq!(code, 0, "{}\n{told}", path.display());
+            }
+        }
+    }
+    assert_eq!(count, 8);
 }

@@ -6,7 +6,7 @@ use super::lints::LintFlags;
 use super::render::{counts, report, tell};
 use super::{Common, Format};
 use clap::Args;
-use flexura::diagnostic::{Diagnostic, Fix, Severity, apply};
+use flexura::diagnostic::{Fix, Severity, apply};
 use flexura::lint::baseline::Baseline;
 use flexura::pipeline::{self, BuildOutcome, Compiler, FileError, Files, Request, placeless};
 use std::collections::BTreeMap;
@@ -71,7 +71,7 @@ pub fn check(arguments: &Check) -> u8 {
             let many = if known == 1 { "finding" } else { "findings" };
             tell(&format!("{}: {known} {many} known from now on\n", path.display()));
         }
-        out.diagnostics.retain(Diagnostic::is_error);
+        out.diagnostics.retain(|d| d.code.starts_with('E'));
     }
     opened.name_as_written(&mut out.sources);
     report(&out.diagnostics, &out.sources, common.format);

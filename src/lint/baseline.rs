@@ -60,7 +60,9 @@ impl Baseline {
     /// The baseline of these findings; errors are none of it.
     pub fn of(found: &[Diagnostic], sources: &SourceMap, files: &[OwnFile]) -> Self {
         let mut known = BTreeMap::new();
-        for key in found.iter().filter(|d| !d.is_error()).filter_map(|d| key(d, sources, files)) {
+        // What is denied is no error of its own.
+        let own = found.iter().filter(|d| !d.code.starts_with('E'));
+        for key in own.filter_map(|d| key(d, sources, files)) {
             *known.entry(key).or_default() += 1;
         }
         Self(known)

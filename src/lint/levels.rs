@@ -98,8 +98,10 @@ impl Levels {
         let mut kept = Vec::with_capacity(found.len());
         let mut known = self.baseline.as_ref().map(Baseline::remaining);
         for d in found.drain(..) {
+            // What is denied is known as well as what is told.
+            let own = d.is_error();
             if let Some(d) = self.leveled(d, &allows, &mut silenced)
-                && !known.as_mut().is_some_and(|k| !d.is_error() && k.takes(&d, sources, files))
+                && (own || !known.as_mut().is_some_and(|k| k.takes(&d, sources, files)))
             {
                 kept.push(d);
             }

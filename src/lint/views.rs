@@ -152,7 +152,7 @@ impl<'a> OfDesign<'a> {
 
     /// The statements of its mechanism; none where that stands in another file than the design's own.
     pub fn statements(&self) -> &'a [Statement] {
-        self.text.blocks.iter().find(|b| b.at == self.design.origin).map_or(&[], |b| b.statements)
+        self.text.statements(self.design.origin)
     }
 
     /// What is required of it: by itself, and by the mechanism that places it.

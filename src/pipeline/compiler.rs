@@ -107,6 +107,7 @@ impl Stages for Compiler {
     }
 
     fn sweep(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
+        let design = &*gravity::weighed(design, values);
         let (layout, motion) = layout(design, values)?;
         let model = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
         let cycle = sweep(&model).map_err(|e| lost(design, &e))?;
@@ -123,6 +124,7 @@ impl Stages for Compiler {
     }
 
     fn terms(&self, design: &Design, values: &[f64]) -> Vec<(String, f64)> {
+        let design = &*gravity::weighed(design, values);
         let Ok((layout, _)) = layout(design, values) else { return Vec::new() };
         let problem = Problem::new(design, &layout, EDGES);
         let Some(trial) = problem.simulate(&problem.to_unit(values)) else { return Vec::new() };

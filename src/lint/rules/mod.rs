@@ -27,12 +27,10 @@ rules! {
     w1009_similar_names
     w1010_suspicious_length
     w1012_start_at_bound
-    w1013_equal_bounds
     w1014_wide_bounds
     w1015_same_points
     w1016_short_body
     w1017_same_bodies
-    w1018_point_listed_twice
     w1019_requirement_always_holds
     w1020_requirement_cannot_hold
     w1021_requirement_above_strength

@@ -33,7 +33,7 @@ fn check(of: &OfDesign) -> Vec<Diagnostic> {
     if of.design.rods.is_empty() {
         return found;
     }
-    for drive in of.design.drives.iter().filter(|d| d.free_rest.is_none()) {
+    for drive in of.design.drives.iter().filter(|d| d.free_rest.is_none() && d.joint().is_some()) {
         let values = (0..=steps).map(|s| drive.value(s as f64 / steps as f64));
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         let way = high - low;

@@ -17,7 +17,7 @@
 //! ## Fix
 //!
 //! `--unsafe-fixes` writes the value. It is not safe: the part is another one, and an old lock only a start for it. Where a
-//! `free` rest pose is written, the optimiser chooses, and nothing is told.
+//! `free` rest pose is written, the optimiser chooses, and nothing is told; nor of a string, which cannot push back from the middle.
 use crate::kinematics::motion::State;
 use crate::lint::prelude::*;
 use crate::lint::shapes::turn;
@@ -38,7 +38,7 @@ fn check(view: &OfMotion) -> Vec<Diagnostic> {
     // With several drives the best state of the cycle is one value of each; that the optimiser cannot be asked twice is
     // why a free rest pose is left alone.
     let Some(first) = design.drives.first() else { return Vec::new() };
-    if design.drives.iter().any(|d| d.free_rest.is_some()) {
+    if design.drives.iter().any(|d| d.free_rest.is_some() || d.joint().is_none()) {
         return Vec::new();
     }
     let compliant: Vec<(usize, [usize; 2])> = design

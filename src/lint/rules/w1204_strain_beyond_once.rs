@@ -28,7 +28,7 @@ fn check(view: &OfFlexures) -> Vec<Diagnostic> {
         .into_iter()
         .map(|(joint, f)| {
             let message = format!(
-                "`{}` is strained by {:.1} % at the least; `{}` bears {:.1} % once",
+                "`{}` is strained by {:.2} % at the least; `{}` bears {:.2} % once",
                 joint.name,
                 100.0 * strain(f).unwrap_or_default(),
                 material.name,

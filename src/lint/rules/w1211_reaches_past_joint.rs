@@ -1,6 +1,7 @@
 //! ## What it finds
 //!
-//! A flexure of a hinge that is attached further from its joint than the next joint of that body is.
+//! A flexure of a hinge that is attached further from its joint than the next joint of that body is, by a
+//! fifth.
 //!
 //! ## Why it matters
 //!
@@ -21,6 +22,9 @@ use crate::lint::prelude::*;
 pub const RULE: Rule =
     Rule { code: "W1211", name: "reaches-past-joint", severity: Severity::Warning, check: Check::Flexures(check) };
 
+/// Ends this much further out than the next joint pass it; one a little further lies beside it.
+const PAST: f64 = 1.2;
+
 fn check(view: &OfFlexures) -> Vec<Diagnostic> {
     let design = view.of.design;
     let points = &view.motion.joint_points;
@@ -37,7 +41,7 @@ fn check(view: &OfFlexures) -> Vec<Diagnostic> {
                     .filter(|d| *d > 1.0)
                     .fold(f64::INFINITY, f64::min);
                 // One that is aimed elsewhere passes beside the next joint.
-                if !aimed && reach > next && worst.is_none_or(|w| reach - next > w.0 - w.1) {
+                if !aimed && reach > PAST * next && worst.is_none_or(|w| reach - next > w.0 - w.1) {
                     let name = design.bodies.get(end.body).map_or("", |b| b.name.as_str());
                     worst = Some((reach, next, name));
                 }

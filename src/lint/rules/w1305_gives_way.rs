@@ -1,6 +1,6 @@
 //! ## What it finds
 //!
-//! A traced point that gives way by more than a tenth of the length of its path, or 5 mm, whichever is more, to a force of 1 N across
+//! A traced point that gives way by more than a tenth of the length of its path, or 5 mm, whichever is more, to a force of 0.1 N (10 g) across
 //! the path, with the drives held.
 //!
 //! ## Why it matters
@@ -24,6 +24,8 @@ pub const RULE: Rule =
 
 /// Part of the path that a newton may move the point.
 const MOST_PART: f64 = 0.1;
+/// The force, N: about what such parts weigh themselves.
+const FORCE_N: f64 = 0.1;
 /// What is always borne, mm.
 const LEAST_MM: f64 = 5.0;
 
@@ -31,8 +33,9 @@ fn check(view: &OfSolution) -> Vec<Diagnostic> {
     let mut found = Vec::new();
     for (i, (trace, give)) in view.of.design.traces.iter().zip(&view.simulation.sway_mm).enumerate() {
         let limit = (MOST_PART * walk::path_mm(view.simulation, i)).max(LEAST_MM);
-        if *give > limit {
-            let message = format!("1 N across its path moves `{}` by {give:.1} mm", trace.name);
+        let give = FORCE_N * give;
+        if give > limit {
+            let message = format!("{FORCE_N} N across its path moves `{}` by {give:.1} mm", trace.name);
             found.push(
                 RULE.finds(message, trace.origin)
                     .help(format!("add `sway({}, force = 0.2 N, scale = 5 mm)`, or take flexures that are firm across", trace.name)),
