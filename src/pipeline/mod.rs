@@ -4,6 +4,7 @@
 mod aims;
 mod assembly;
 mod compiler;
+mod gravity;
 mod joined;
 mod manifest;
 mod measure;
