@@ -123,6 +123,17 @@ fn the_default_start_builds() {
     builds("hinge");
 }
 
+/// Without flexures and loads every torque is a rounding error: such a mechanism rests wherever it is put.
+#[test]
+fn ordinary_hinges_rest_nowhere_in_particular() {
+    let dir = tempfile::tempdir().unwrap();
+    flexura(dir.path(), &["new", "first", "--from", "watt"]);
+    let out = flexura(dir.path(), &["build", "first/first.mech"]);
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    let told = text(&out.stdout);
+    assert!(told.contains("least gap") && !told.contains("rests"), "{told}");
+}
+
 #[test]
 fn other_starts_build_too() {
     if common::skipped() {
