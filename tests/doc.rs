@@ -67,7 +67,7 @@ fn host(item: &Entry) -> String {
 {}
 mechanism host {{
     point P = (0 mm, 0 mm)
-    point A = (-40 mm, 0 mm)
+    point A = (-40 mm, -15 mm)
     point B = (30 mm, 20 mm)
     point C = (0 mm, -40 mm)
     ground link1 {{ A, P }}
@@ -186,7 +186,8 @@ fn text_keeps_to_its_width() {
             text.push_str(&paper.page(p));
         }
         assert!(
-            text.contains("thickness: length = 0.8 mm, free in process.least_wall .. 2 mm, in mm"),
+            text.contains("thickness: length = 0.8 mm, free in process.least_wall .. 2 mm\n")
+                && text.contains("size: length = shorter_link / 3, in mm"),
             "{text}"
         );
     }

@@ -39,7 +39,7 @@ fn every_start_checks_clean() {
         assert!(text(&made.stdout).starts_with(&file), "{}", text(&made.stdout));
         let source = std::fs::read_to_string(dir.path().join(&file)).unwrap();
         assert!(source.contains(&format!("mechanism my_{start} {{")), "{source}");
-        assert!(source.matches("//").count() > 8, "{start} is commented");
+        assert!(source.matches("//").count() >= 6, "{start} is commented");
         let checked = flexura(dir.path(), &["check", &file]);
         assert_eq!(checked.status.code(), Some(0), "{start}: {}", text(&checked.stderr));
         // A rod between two balls may turn idly: that is told, and is no fault.
@@ -95,7 +95,7 @@ fn the_library_and_own_files_can_be_browsed() {
     }
     assert_eq!(show(&["doc", "std.flexures.wire"]), show(&["doc", "wire"]));
     assert!(show(&["doc", "materials"]).matches("\nmaterial ").count() > 10);
-    assert!(show(&["doc", "leg/leg.mech"]).contains("step: length = 150 mm, in mm"));
+    assert!(show(&["doc", "leg/leg.mech"]).contains("step: length = 150 mm\n"));
     let json: serde_json::Value = serde_json::from_str(&show(&["doc", "wire", "--format", "json"])).unwrap();
     assert_eq!(json["pages"][0]["items"][0]["parameters"][1]["name"], "diameter");
     show(&["doc", "leg/leg.mech", "--html", "--out", "site"]);
@@ -121,6 +121,17 @@ fn builds(start: &str) {
 #[test]
 fn the_default_start_builds() {
     builds("hinge");
+}
+
+/// Without flexures and loads every torque is a rounding error: such a mechanism rests wherever it is put.
+#[test]
+fn ordinary_hinges_rest_nowhere_in_particular() {
+    let dir = tempfile::tempdir().unwrap();
+    flexura(dir.path(), &["new", "first", "--from", "watt"]);
+    let out = flexura(dir.path(), &["build", "first/first.mech"]);
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    let told = text(&out.stdout);
+    assert!(told.contains("least gap") && !told.contains("rests"), "{told}");
 }
 
 #[test]

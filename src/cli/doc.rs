@@ -85,7 +85,10 @@ fn pages(wanted: &str, library: &[Page]) -> Result<Vec<Page>, Box<Diagnostic>> {
         let text = read_text(Path::new(wanted)).map_err(|e| {
             Box::new(placeless(Severity::Error, "E0730", format!("cannot read `{wanted}`: {e}")))
         })?;
-        return Ok(vec![Page::of(wanted, &text)]);
+        // Pages may be put elsewhere: where this machine keeps the file is no part of them.
+        let path = Path::new(wanted);
+        let name = path.file_name().and_then(|n| n.to_str()).filter(|_| path.is_absolute());
+        return Ok(vec![Page::of(name.unwrap_or(wanted), &text)]);
     }
     let name = wanted.strip_prefix("std.").unwrap_or(wanted);
     let short = |p: &Page| p.path.strip_prefix("std.").unwrap_or(&p.path).to_string();

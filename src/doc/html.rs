@@ -86,10 +86,9 @@ pub fn site(pages: &[Page]) -> Result<Vec<SiteFile>, String> {
 
 fn shown(of: &Entry) -> Shown<'_> {
     let row = |p| Row { of: p, about: paragraphs(&p.about) };
-    let rows = |all: &'_ [Parameter]| -> usize { all.len() };
     let mut tables = Vec::new();
     for (title, all) in [("Parameters", &of.parameters), ("Free besides", &of.free)] {
-        if rows(all) > 0 {
+        if !all.is_empty() {
             tables.push((title, all.iter().map(row).collect()));
         }
     }

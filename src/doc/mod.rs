@@ -103,10 +103,11 @@ pub fn library() -> Vec<Page> {
 /// Up to the first full stop that ends a sentence.
 fn first_sentence(text: &str) -> String {
     let line = text.split("\n\n").next().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ");
-    // `J. C. Klann` ends no sentence: what stands before the full stop is longer than an initial.
+    // `J. C. Klann` and `Fig. 3` end no sentence: an initial stands before the stop, or a number after it.
     let ends = |at: usize| {
-        let before = line.get(..at).unwrap_or_default();
-        before.rsplit(|c: char| !c.is_alphanumeric()).next().is_some_and(|w| w.chars().count() > 2)
+        let (before, after) = (line.get(..at).unwrap_or_default(), line.get(at + 2..).unwrap_or_default());
+        let word = before.rsplit(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
+        word.chars().count() > 2 && !after.starts_with(|c: char| c.is_ascii_digit())
     };
     match line.match_indices(". ").find(|(at, _)| ends(*at)) {
         Some((at, _)) => line.get(..=at).unwrap_or_default().to_string(),
@@ -135,6 +136,7 @@ mod tests {
             "Klann's leg (J. C. Klann, 2001)."
         );
         assert_eq!(first_sentence("One line\nover two\n\nand more. Yes."), "One line over two");
+        assert_eq!(first_sentence("Leaves (section 3, Fig. 3). More."), "Leaves (section 3, Fig. 3).");
         assert_eq!(first_sentence(""), "");
     }
 

@@ -143,7 +143,7 @@ impl Source<'_> {
         let (name, kind) = (f.name.node.clone(), f.replaces.node.clone());
         let others = ["link1", "link2", "link3", "link4"].into_iter().take(bodies).skip(1);
         let axis = match kind.as_str() {
-            "universal" => "  axis x and y",
+            "universal" => "  axis x and z",
             "slider" => "  axis x",
             "hinge" => "  axis z",
             _ => "",

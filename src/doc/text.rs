@@ -85,7 +85,9 @@ impl Paper<'_> {
         out.push_str(&format!("{}\n", (self.paint)(Tone::Dim, title)));
         for p in all {
             let kind = p.kind.as_ref().map(|k| format!(": {k}")).unwrap_or_default();
-            let unit = p.unit.as_ref().filter(|u| *u != "1").map(|u| format!(", in {u}")).unwrap_or_default();
+            // Where the default has a unit, it need not be told again.
+            let written = |u: &&String| *u != "1" && !p.default.contains(u.as_str());
+            let unit = p.unit.as_ref().filter(written).map(|u| format!(", in {u}")).unwrap_or_default();
             let bounds = p.bounds.as_ref().map(|(a, b)| format!(", free in {a} .. {b}")).unwrap_or_default();
             let head = format!("  {}", (self.paint)(Tone::Strong, &p.name));
             out.push_str(&format!(

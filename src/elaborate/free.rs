@@ -63,7 +63,9 @@ impl<'a> Evaluator<'a> {
         }
         let path = self.unique_path(path);
         self.settable.insert(path.clone());
-        if let Some((index, fixed)) = self.settings.find(&path) {
+        // What is set or given may be free itself: then it is what is looked at here.
+        let set = self.settings.find(&path).filter(|(_, e)| e.is_none_or(|e| e.at != at));
+        if let Some((index, fixed)) = set {
             // `--set` of a free value inside a template fixes it.
             self.set_used.insert(index);
             let Some(fixed) = fixed else { return Err(Failed) };
