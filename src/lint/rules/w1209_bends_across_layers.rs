@@ -1,7 +1,7 @@
 //! ## What it finds
 //!
 //! A compliant hinge whose axis does not stand on the printed layers (within 30°), in a process whose parts are weak across them:
-//! one that states `across_layers` below 80 %.
+//! one that states `across` below 80 %.
 //!
 //! ## Why it matters
 //!

@@ -1,6 +1,6 @@
 //! ## What it finds
 //!
-//! A printed part whose bounding box does not fit into the build volume that the process states (`bed_x`, `bed_y`, `bed_z`), in
+//! A printed part whose bounding box does not fit into the build volume that the process states (`bed_width`, `bed_depth`, `bed_height`), in
 //! whatever of the six ways its sides are laid along those of the bed.
 //!
 //! ## Why it matters
