@@ -166,10 +166,26 @@ fn run_build(
     Some(())
 }
 
-/// Text to a design without errors.
+/// Text to a design without errors, and where no variant is chosen, all its variants too.
 pub fn check(request: &Request, stages: &dyn Stages, files: &dyn Files) -> BuildOutcome {
     let mut out = BuildOutcome::default();
     front_end(request, stages, files, &mut out);
+    if out.assembly.is_none() || request.variant.is_some() {
+        return out;
+    }
+    for variant in out.variants.clone() {
+        let mut other = BuildOutcome::default();
+        let request = Request { variant: Some(variant.clone()), ..request.clone() };
+        front_end(&request, stages, files, &mut other);
+        for mut d in other.diagnostics {
+            let place = |d: &Diagnostic| d.labels.first().map(|l| l.at);
+            let same = |o: &Diagnostic| o.code == d.code && o.message == d.message && place(o) == place(&d);
+            if !out.diagnostics.iter().any(same) {
+                d.message.push_str(&format!(" (variant `{variant}`)"));
+                out.diagnostics.push(d);
+            }
+        }
+    }
     out
 }
 
