@@ -116,6 +116,7 @@ impl<'a> Evaluator<'a> {
             skeleton,
             layer: layer.unwrap_or(0),
             owner: None,
+            printed: None,
             origin: text.at,
         })
     }

@@ -182,11 +182,12 @@ impl Making<'_> {
             }],
             (_, LayoutLoadKind::Gravity { specific_n_mm3, links }) => {
                 let link = |force: &PointForce| {
-                    let skeleton = &self.design.bodies[force.body].skeleton;
+                    let body = &self.design.bodies[force.body];
+                    let skeleton = &body.skeleton;
                     let at: Vec<_> = skeleton.iter().map(|p| self.values.point(p.position)).collect();
                     let rates: Vec<_> = skeleton.iter().map(|p| self.drawn(&p.position)).collect();
                     let pose = (&self.layout.rest_poses[force.body], &self.change.rest[force.body]);
-                    weight::link_change(&at, &rates, height_mm, pose, specific_n_mm3)
+                    weight::link_change(body, &at, &rates, height_mm, pose, specific_n_mm3)
                 };
                 links.iter().map(link).collect()
             }

@@ -1,12 +1,12 @@
-//! What links weigh. Solids are made long after the equilibrium, so a link is weighed by its skeleton: flat bars of the
-//! links' height and width along the shortest tree through its points, with round ends. Bosses, stubs towards
-//! flexures, bores and rounded edges are not in it: of Chebyshev's printed part it sees 82 % (`tests/weight.rs`).
+//! What links weigh. Flat bars of the links' height and width along the shortest tree through a link's points, with round
+//! ends, follow the design with exact derivatives. What the printed form has beyond them (bosses, stubs, risers, less
+//! bores and rounded edges) is measured beforehand (`geometry/weigh.rs`) and added as a constant.
 
 use super::load::{PointForce, PointForceChange};
 use crate::geometry::link::BAR_PER_HEIGHT;
 use crate::geometry::skeleton::spanning_tree;
 use crate::ir::expr::ExprId;
-use crate::ir::{Design, Material};
+use crate::ir::{Body, Design, Material};
 use crate::kinematics::{Motion, Twist};
 use crate::math::Pose;
 use nalgebra::Vector3;
@@ -34,14 +34,21 @@ pub(super) fn links(
         .map(|(body, b)| {
             let at: Vec<Vector3<f64>> = b.skeleton.iter().map(|p| points(p.position)).collect();
             let (volume, center) = volume_and_center(&at, design.layers.height_mm);
-            let rest = motion.rest_point(body, &center);
-            PointForce { body, rest, force_n: specific_n_mm3 * volume }
+            let (more, shift) = extra(b);
+            let rest = motion.rest_point(body, &(center + shift));
+            PointForce { body, rest, force_n: specific_n_mm3 * (volume + more) }
         })
         .collect()
 }
 
+/// Volume and shift of the centre that the printed form adds to the bars.
+fn extra(body: &Body) -> (f64, Vector3<f64>) {
+    body.printed.map_or((0.0, Vector3::zeros()), |p| (p.volume_mm3, Vector3::from(p.center_mm)))
+}
+
 /// How that of a link changes when its drawn points move by `rates` and its rest pose by `twist`.
 pub(super) fn link_change(
+    body: &Body,
     points: &[Vector3<f64>],
     rates: &[Vector3<f64>],
     height_mm: f64,
@@ -50,7 +57,7 @@ pub(super) fn link_change(
 ) -> PointForceChange {
     let [(_, center), (volume, moved)] = volume_and_center_moving(points, rates, height_mm);
     PointForceChange {
-        rest: twist.at(&rest.point(&center)) + rest.direction(&moved),
+        rest: twist.at(&rest.point(&(center + extra(body).1))) + rest.direction(&moved),
         force_n: specific_n_mm3 * volume,
     }
 }

@@ -81,6 +81,21 @@ pub struct BoreCut {
     pub diameter_mm: f64,
 }
 
+impl BoreCut {
+    /// The hole as a disc.
+    pub fn slot(&self) -> Slot {
+        let middle = (self.start + self.end) / 2.0;
+        Slot {
+            start: middle,
+            end: middle,
+            axis: (self.end - self.start).try_normalize(0.0).unwrap_or_else(Vector3::z),
+            disc_radius_mm: self.diameter_mm / 2.0,
+            half_height_mm: (self.end - self.start).norm() / 2.0,
+            round_mm: 0.0,
+        }
+    }
+}
+
 /// A body as primitives in the rest pose.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BodyPlan {
@@ -109,17 +124,7 @@ impl BodyPlan {
             .map(|(i, b)| {
                 let n = ((facets.around / 4).max(2) * 4) as f64;
                 let radius = b.diameter_mm / 2.0 / (std::f64::consts::PI / n).cos();
-                let axis = (b.end - b.start).try_normalize(0.0).unwrap_or_else(Vector3::z);
-                let (middle, half) = ((b.start + b.end) / 2.0, (b.end - b.start).norm() / 2.0);
-                let slot = Slot {
-                    start: middle,
-                    end: middle,
-                    axis,
-                    disc_radius_mm: radius,
-                    half_height_mm: half,
-                    round_mm: 0.0,
-                };
-                slot.mesh(facets, spread(i + 100) + 0.5)
+                Slot { disc_radius_mm: radius, ..b.slot() }.mesh(facets, spread(i + 100) + 0.5)
             })
             .collect()
     }

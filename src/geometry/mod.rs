@@ -13,6 +13,7 @@
 //! | `tidy` | removal of tiny edges before rounding to `f32` |
 //! | `union` | the boolean kernel's only client |
 //! | `mesh`, `check`, `exact`, `ray` | triangle meshes, their facts by exact arithmetic, measurements on them |
+//! | `weigh` | what links weigh, before anything is meshed |
 //! | `joined` | parts of several instances |
 //! | `distance`, `gap`, `cycle` | least distances, overlaps in the rest pose, gaps over a cycle |
 
@@ -41,6 +42,7 @@ pub mod sweep;
 pub mod tidy;
 pub mod union;
 mod wall;
+pub mod weigh;
 
 #[cfg(test)]
 mod tests;
@@ -59,3 +61,4 @@ pub use parts::{
 };
 pub use ray::Probe;
 pub use slot::{Facets, Slot};
+pub use weigh::{has_gravity, printed_volume_and_center, weigh};

@@ -134,8 +134,22 @@ pub struct Body {
     /// text's bodies and has no skeleton. The conventional mechanism carries it with the joint's first body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub owner: Option<JointId>,
+    /// What gravity needs of the printed form at some values; derived, and so no part of the design's text form.
+    #[serde(skip)]
+    pub printed: Option<PrintedExtra>,
     /// Declaration.
     pub origin: Origin,
+}
+
+/// What a printed link has beyond flat bars through its points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PrintedExtra {
+    /// Printed volume, mm³.
+    pub printed_mm3: f64,
+    /// Volume more than the bars', mm³.
+    pub volume_mm3: f64,
+    /// Centre of mass from the bars' (from the origin where there are none), in the drawing pose, mm.
+    pub center_mm: [f64; 3],
 }
 
 /// A named point of a skeleton.

@@ -61,6 +61,11 @@ impl Pose {
         self.rotation * rest
     }
 
+    /// Rest position of a point given where it is now, mm.
+    pub fn back(&self, point: &Vector3<f64>) -> Vector3<f64> {
+        self.center + self.rotation.transpose() * (point - self.center - self.translation)
+    }
+
     /// Applies an increment: translation (mm), rotation vector (rad).
     pub fn retract(&self, du: &Vector3<f64>, dphi: &Vector3<f64>) -> Self {
         Self {

@@ -2,6 +2,7 @@
 //! optimisation and geometry.
 
 use super::aims::AimSeries;
+use super::gravity;
 use super::joined::{self, Solid};
 use super::progress::Iteration;
 use super::report::{Artefact, Place, Worst};
@@ -80,6 +81,7 @@ impl Stages for Compiler {
     }
 
     fn simulate(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
+        let design = &*gravity::weighed(design, values);
         let (layout, motion) = layout(design, values)?;
         let model = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
         let cycle = sweep(&model).map_err(|e| lost(design, &e))?;
@@ -125,6 +127,7 @@ impl Stages for Compiler {
             return Between::default();
         }
         let planned = |(design, values): (&Design, &Vec<f64>)| {
+            let design = &*gravity::weighed(design, values);
             let (layout, _) = layout(design, values).ok()?;
             let model = Model::new(design, &layout, values, EDGES, false).ok()?;
             let cycle = sweep(&model).ok()?;
@@ -136,6 +139,58 @@ impl Stages for Compiler {
     }
 
     fn optimize(
+        &self,
+        design: &Design,
+        start: &[f64],
+        on_iteration: &dyn Fn(&Iteration),
+        cancel: &AtomicBool,
+    ) -> Result<Solved, Failed> {
+        gravity::rounds(design, start, self.iterations, on_iteration, &|design, start, iterations, told| {
+            Self { iterations, ..*self }.solve(design, start, told, cancel)
+        })
+    }
+
+    fn parts(
+        &self,
+        assembly: &Assembly,
+        values: &[Vec<f64>],
+    ) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
+        let mut found = Vec::new();
+        let mut built = Vec::new();
+        for (d, (design, values)) in assembly.designs.iter().zip(values).enumerate() {
+            solids::available(design)?;
+            let design = &*gravity::weighed(design, values);
+            let (layout, _) = layout(design, values)?;
+            let model =
+                Model::new(design, &layout, values, MESH_EDGES, false).map_err(|e| no_rod(design, &e))?;
+            // What flexures sweep over the cycle is taken out of their own links.
+            let solved = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
+            let cycle = sweep(&solved).map_err(|e| lost(design, &e))?;
+            let states = solids::states(design, &layout, &solved, &cycle);
+            let (parts, findings) = solids::build(design, &layout, &model, &states, &|bodies| {
+                joined::stands_alone(assembly, d, bodies)
+            })?;
+            found.extend(findings);
+            built.push(Solid { input: parts_input(design, &layout, &model), parts, states });
+        }
+        let (parts, findings) = joined::parts(assembly, &built)?;
+        found.extend(findings);
+        let mut artefacts = Vec::new();
+        for part in &parts {
+            let bytes = stl_bytes(&part.mesh).map_err(|e| {
+                vec![Diagnostic::error("E0631", format!("no STL can be written: {e}"), assembly.origin)]
+            })?;
+            // `finger[2]` is no name for a file.
+            let name = format!("{}.stl", part.name.replace('[', "-").replace(']', ""));
+            artefacts.push(Artefact { name, bytes });
+        }
+        Ok((artefacts, found))
+    }
+}
+
+impl Compiler {
+    /// One run of the optimiser.
+    fn solve(
         &self,
         design: &Design,
         start: &[f64],
@@ -205,43 +260,6 @@ impl Stages for Compiler {
             interrupted: found.ending == Ending::Interrupted,
             diagnostics,
         })
-    }
-
-    fn parts(
-        &self,
-        assembly: &Assembly,
-        values: &[Vec<f64>],
-    ) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
-        let mut found = Vec::new();
-        let mut built = Vec::new();
-        for (d, (design, values)) in assembly.designs.iter().zip(values).enumerate() {
-            solids::available(design)?;
-            let (layout, _) = layout(design, values)?;
-            let model =
-                Model::new(design, &layout, values, MESH_EDGES, false).map_err(|e| no_rod(design, &e))?;
-            // What flexures sweep over the cycle is taken out of their own links.
-            let solved = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
-            let cycle = sweep(&solved).map_err(|e| lost(design, &e))?;
-            let states = solids::states(design, &layout, &solved, &cycle);
-            let (parts, findings) = solids::build(design, &layout, &model, &states, &|bodies| {
-                joined::stands_alone(assembly, d, bodies)
-            })?;
-            found.extend(findings);
-            built.push(Solid { input: parts_input(design, &layout, &model), parts, states });
-        }
-        let (parts, findings) = joined::parts(assembly, &built)?;
-        found.extend(findings);
-        let mut artefacts = Vec::new();
-        for part in &parts {
-            let bytes = stl_bytes(&part.mesh).map_err(|e| {
-                vec![Diagnostic::error("E0631", format!("no STL can be written: {e}"), assembly.origin)]
-            })?;
-            artefacts.push(Artefact {
-                name: format!("{}.stl", part.name.replace('[', "-").replace(']', "")),
-                bytes,
-            });
-        }
-        Ok((artefacts, found))
     }
 }
 

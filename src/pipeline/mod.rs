@@ -5,6 +5,7 @@ mod aims;
 mod assembly;
 mod compiler;
 mod examine;
+mod gravity;
 mod joined;
 mod manifest;
 mod measure;
