@@ -129,7 +129,7 @@ fn loops_nest_and_their_bounds_may_be_parameters() {
     );
     let found = assembly(&text);
     let names: Vec<&str> = found.instances.iter().map(|i| i.name.as_str()).collect();
-    assert_eq!(names, ["leg[0]", "leg[1]", "leg[2]", "leg[4]", "back[0]", "leg[5]"]);
+    assert_eq!(names, ["leg[0]", "leg[1]", "leg[2]", "leg[4]", "leg[5]", "back[0]"]);
     assert_eq!(found.instances[3].placement.translation, [300.0, -200.0, -20.0]);
     let more = run(&text, None, &[("n", "3")]).assembly.unwrap();
     assert_eq!(more.instances.len(), 8);
