@@ -115,7 +115,7 @@ impl Stages for Toy {
         }
         let mut sources = SourceMap::default();
         sources.add(source, "text");
-        Checked { sources, assembly: Some(Assembly::of(design)), diagnostics: Vec::new() }
+        Checked { sources, assembly: Some(Assembly::of(design)), ..Checked::default() }
     }
 
     fn rigid(&self, design: &Design, _: &[f64]) -> Result<Simulation, Failed> {
