@@ -28,6 +28,8 @@ fn wrong_usage_is_2() {
         &["build", "a.mech", "--resume", "--frozen"],
         &["build", "a.mech", "--format", "xml"],
         &["check", "a.mech", "--rigid"],
+        &["build", "a.mech", "--variant", "../../up"],
+        &["build", "a.mech", "--variant", "large", "--all-variants"],
     ] {
         let output = flexura(dir.path(), arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
@@ -41,7 +43,7 @@ fn help_and_version_are_0() {
     let dir = tempfile::tempdir().unwrap();
     let help = flexura(dir.path(), &["--help"]);
     assert_eq!(help.status.code(), Some(0));
-    for command in ["check", "build", "simulate", "ir"] {
+    for command in ["check", "build", "simulate", "ir", "test", "diff"] {
         assert!(text(&help.stdout).contains(command), "{command}");
         assert_eq!(flexura(dir.path(), &[command, "--help"]).status.code(), Some(0));
     }

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 fn findings(text: &str) -> Vec<Diagnostic> {
     let files: BTreeMap<String, String> = [("main.mech".to_string(), text.to_string())].into();
     let compiler = Compiler { iterations: 1, ..Compiler::default() };
-    let checked = compiler.check("main.mech", &[], Some(12), &files);
+    let checked = compiler.check("main.mech", &[], Some(12), None, &files);
     let mut found = checked.diagnostics;
     let Some(design) = checked.assembly.as_ref().and_then(|a| a.single()).cloned() else { return found };
     let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();

@@ -51,6 +51,7 @@ fn each_dependency_is_seen_by_one_folder() {
         ("clap", "cli/"),
         ("indicatif", "cli/"),
         ("ctrlc", "cli/"),
+        ("quick_xml", "cli/"),
     ] {
         for (file, text) in &sources {
             assert!(!uses(text, name) || file.starts_with(folder), "{file} uses {name}");

@@ -304,3 +304,108 @@ fn git_calls_it_for_designs() {
     let lines = git(dir.path(), &all);
     assert!(lines.contains("-a") && lines.contains("+b"), "{lines}");
 }
+
+#[test]
+fn the_hook_lets_through_what_holds() {
+    if no_git() {
+        return;
+    }
+    let dir = repository();
+    let hook = dir.path().join(".git/hooks/pre-commit");
+    std::fs::create_dir_all(hook.parent().unwrap()).unwrap();
+    // Copied with its permissions, as the manual has it.
+    std::fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/ci/pre-commit"), &hook).unwrap();
+    let file = dir.path().join("legs/leg.mech");
+    let commit = || run(dir.path(), "git", &["commit", "-q", "-m", "try"]);
+    // A comment, and a file that is no design.
+    std::fs::write(&file, format!("// A note.\n{DESIGN}")).unwrap();
+    std::fs::write(dir.path().join("other.lock"), "of another program\n").unwrap();
+    git(dir.path(), &["add", "."]);
+    let fine = commit();
+    assert!(fine.status.success(), "{}{}", text(&fine.stdout), text(&fine.stderr));
+    // What is committed counts, not what lies in the working tree.
+    let changed = DESIGN.replace("length = 20 mm", "length = 21 mm");
+    std::fs::write(&file, &changed).unwrap();
+    git(dir.path(), &["add", "."]);
+    std::fs::write(&file, DESIGN).unwrap();
+    let stale = commit();
+    assert!(!stale.status.success());
+    assert!(text(&stale.stderr).contains("E0714") && text(&stale.stderr).contains("not committed"));
+    git(dir.path(), &["reset", "-q", "--hard"]);
+    // A lock that is taken away.
+    git(dir.path(), &["rm", "-q", "legs/leg.lock"]);
+    assert!(!commit().status.success());
+    git(dir.path(), &["reset", "-q", "--hard"]);
+    std::fs::write(&file, DESIGN.replace("<= 1 mm", "<= 0.0001 mm")).unwrap();
+    git(dir.path(), &["add", "."]);
+    assert!(!commit().status.success());
+    git(dir.path(), &["commit", "-q", "--no-verify", "-m", "all the same"]);
+}
+
+#[test]
+fn the_build_servers_script_leaves_its_reports() {
+    if no_git() {
+        return;
+    }
+    let ci = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/ci");
+    let script = std::fs::read_to_string(ci.join("check-designs.sh")).unwrap();
+    let dir = repository();
+    std::fs::write(dir.path().join("legs/clay.mech"), "material clay {\n    E = 1 MPa\n    nu = 0.4\n}\n")
+        .unwrap();
+    git(dir.path(), &["add", "."]);
+    let go = || run(dir.path(), "sh", &[ci.join("check-designs.sh").to_str().unwrap()]);
+    let output = go();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let report = |name: &str| std::fs::read_to_string(dir.path().join("reports").join(name)).unwrap();
+    roxmltree::Document::parse(&report("flexura.xml")).unwrap();
+    let log: serde_json::Value = serde_json::from_str(&report("1.sarif")).unwrap();
+    assert_eq!(log["version"], "2.1.0");
+    assert!(!dir.path().join("reports/2.sarif").exists(), "a material is no design");
+    std::fs::write(dir.path().join("legs/leg.mech"), DESIGN.replace("half = 2.5", "half = 2.6")).unwrap();
+    assert_eq!(go().status.code(), Some(1));
+    // The workflow's step is the script, line by line.
+    let workflow = std::fs::read_to_string(ci.join("flexura.yml")).unwrap();
+    let (_, after) = workflow.split_once("        run: |\n").unwrap();
+    let step = after.lines().map_while(|l| l.strip_prefix("          "));
+    let lines: Vec<&str> = script.lines().filter(|l| !l.starts_with('#')).collect();
+    assert_eq!(step.collect::<Vec<_>>(), lines);
+}
+
+/// A design with nothing to solve, and one variant.
+#[test]
+fn variants_have_locks_and_folders_of_their_own() {
+    let dir = tempfile::tempdir().unwrap();
+    let design = "use std.materials.rigur\nuse std.processes.polyjet\nmechanism crank {\n    param r: length = 20 mm\n    \
+         let slack = free 1 mm in 0.5 mm .. 2 mm\n    point O = (0 mm, 0 mm)\n    point A = (0 mm, r + slack)\n    \
+         ground base { O }\n    link arm { O, A }\n    hinge axle: base to arm at O\n    material rigur\n    print on polyjet\n    \
+         cycle 4 steps over 1 s\n    drive axle from 0 deg to 30 deg\n    trace tip = A on arm\n    \
+         require max(error(tip)) <= 0.1 mm\n    variant large { r = 30 mm }\n}\n";
+    std::fs::write(dir.path().join("crank.mech"), design).unwrap();
+    let statuses = || -> Vec<(String, String)> {
+        let value = json(&flexura(dir.path(), &["test", "crank.mech", "--format", "json"]));
+        let of =
+            |d: &serde_json::Value| (d["variant"].to_string(), d["status"].as_str().unwrap().to_string());
+        value["designs"].as_array().unwrap().iter().map(of).collect()
+    };
+    let told = |plain: &str, large: &str| {
+        [("null".to_string(), plain.to_string()), ("\"large\"".to_string(), large.to_string())]
+    };
+    assert_eq!(statuses(), told("error", "error"));
+    let one = flexura(dir.path(), &["build", "crank.mech", "--variant", "large", "--format", "json"]);
+    assert_eq!(one.status.code(), Some(0), "{}", text(&one.stdout));
+    assert!(
+        dir.path().join("crank.large.lock").exists() && dir.path().join("out/large/crank.manifest").exists()
+    );
+    assert!(!dir.path().join("crank.lock").exists());
+    assert_eq!(statuses(), told("error", "pass"));
+    let all = flexura(dir.path(), &["build", "crank.mech", "--all-variants", "--format", "json"]);
+    assert_eq!(all.status.code(), Some(0), "{}", text(&all.stdout));
+    let builds = json(&all)["builds"].clone();
+    assert_eq!((&builds[0]["variant"], &builds[1]["variant"]), (&serde_json::Value::Null, &"large".into()));
+    assert_eq!(statuses(), told("pass", "pass"));
+    let wrong = flexura(dir.path(), &["build", "crank.mech", "--variant", "larg"]);
+    assert_eq!(wrong.status.code(), Some(1));
+    assert!(text(&wrong.stderr).contains("E0117") && text(&wrong.stderr).contains("`large`"));
+    let stale = flexura(dir.path(), &["test", "crank.mech", "--solve", "--format", "json"]);
+    assert_eq!(stale.status.code(), Some(0));
+}

@@ -44,7 +44,7 @@ impl Files for Heavy {
 }
 
 fn heavy(file: &'static str) -> Design {
-    let checked = Compiler::default().check(file, &[], None, &Heavy(file));
+    let checked = Compiler::default().check(file, &[], None, None, &Heavy(file));
     let design = checked.assembly.unwrap().designs.swap_remove(0);
     assert_eq!(design.loads.len(), 1);
     design

@@ -14,8 +14,10 @@ use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
 
-/// Solved values that a person is shown; `--format json` has all.
-const MOST_VALUES: usize = 12;
+/// Numbers of a kind that a person is shown; `--format json` has all.
+const MOST_OF_A_KIND: usize = 8;
+/// From this change on, in percent, the factor says more.
+const MOST_PERCENT: f64 = 1000.0;
 
 /// Arguments of `flexura diff`.
 ///
@@ -252,24 +254,23 @@ fn numbers(text: &mut String, numbers: &[Number], style: Style) {
         return;
     }
     let _ = writeln!(text, "\n{}", style.dim("numbers"));
-    let values: Vec<&Number> = numbers.iter().filter(|n| n.kind == "solved value").collect();
-    let others = numbers.iter().filter(|n| n.kind != "solved value");
-    let shown: Vec<&Number> = others.chain(values.iter().copied().take(MOST_VALUES)).collect();
+    let mut kinds: Vec<&str> = numbers.iter().map(|n| n.kind).collect();
+    kinds.dedup();
+    let of = |kind: &str| numbers.iter().filter(move |n| n.kind == kind).collect::<Vec<_>>();
     let name = |n: &Number| format!("{} {}", n.kind, n.name);
-    let width = shown.iter().map(|n| name(n).chars().count()).max().unwrap_or(0);
-    for n in shown {
-        let _ = writeln!(
-            text,
-            "  {:width$}  {:>10}  {:>10}  {}",
-            name(n),
-            number(n.before),
-            number(n.after),
-            n.unit
-        );
-    }
-    if values.len() > MOST_VALUES {
-        let more = format!("  and {} more solved values: --format json has all", values.len() - MOST_VALUES);
-        let _ = writeln!(text, "{}", style.dim(&more));
+    let shown = || kinds.iter().flat_map(|kind| of(kind).into_iter().take(MOST_OF_A_KIND));
+    let width = shown().map(|n| name(n).chars().count()).max().unwrap_or(0);
+    for kind in &kinds {
+        let all = of(kind);
+        for n in all.iter().take(MOST_OF_A_KIND) {
+            let (before, after) = (number(n.before), number(n.after));
+            let _ = writeln!(text, "  {:width$}  {before:>10}  {after:>10}  {}", name(n), n.unit);
+        }
+        if all.len() > MOST_OF_A_KIND {
+            let more =
+                format!("  and {} more of this kind: --format json has all", all.len() - MOST_OF_A_KIND);
+            let _ = writeln!(text, "{}", style.dim(&more));
+        }
     }
 }
 
@@ -285,6 +286,7 @@ fn behaviour(text: &mut String, changes: &Changes, style: Style) {
     for row in &changes.behaviour {
         let shown = |v: Option<f64>| v.map_or("-".into(), number);
         let change = match row.percent().filter(|_| row.differs()) {
+            Some(p) if p >= MOST_PERCENT && row.before > Some(0.0) => format!("×{:.0}", p / 100.0 + 1.0),
             Some(p) if p.abs() >= 0.05 => format!("{p:+.1} %"),
             Some(_) => "±0.0 %".into(),
             None => String::new(),

@@ -121,7 +121,7 @@ struct Common {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     steps: Option<u32>,
     /// The variant of this name, in place of the design as it stands
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = word)]
     variant: Option<String>,
     /// Number of threads [default: one a core]; the result does not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -294,6 +294,12 @@ fn configured(mut cli: Cli, matches: &clap::ArgMatches) -> u8 {
             }
         },
     }
+}
+
+/// A name of the language: it becomes a part of file names.
+fn word(text: &str) -> Result<String, String> {
+    let plain = !text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    if plain { Ok(text.into()) } else { Err("it is a name: letters, digits and `_`".into()) }
 }
 
 /// `NAME=VALUE`.

@@ -183,7 +183,40 @@ mod tests {
                 .help("did you mean `x`?"),
             Diagnostic::warning("W0101", "this import is not used", at(main, 0, 3)),
         ];
-        insta::assert_json_snapshot!(log(&found, &sources, &tool()));
+        let log = log(&found, &sources, &tool());
+        let run = &log["runs"][0];
+        let rules = json!([
+            {
+                "id": "E0101",
+                "shortDescription": { "text": "an unknown name" },
+                "defaultConfiguration": { "level": "error" },
+            },
+            { "id": "W0101", "defaultConfiguration": { "level": "warning" } },
+        ]);
+        assert_eq!(run["tool"]["driver"]["rules"], rules);
+        let error = &run["results"][0];
+        assert_eq!(
+            (&error["ruleId"], &error["ruleIndex"], &error["level"]),
+            (&json!("E0101"), &json!(0), &json!("error"))
+        );
+        assert_eq!(error["message"]["text"], "`q` is not declared: not found here\ndid you mean `x`?");
+        // The second line, in characters and not in bytes; the path as a URI.
+        let place = json!({
+            "artifactLocation": { "uri": "parts/a%20b.mech" },
+            "region": {
+                "startLine": 2, "startColumn": 9, "endLine": 2, "endColumn": 10, "byteOffset": 19, "byteLength": 1,
+            },
+        });
+        assert_eq!(error["locations"], json!([{ "physicalLocation": place }]));
+        let related = &error["relatedLocations"][0];
+        assert_eq!(
+            related["physicalLocation"]["artifactLocation"]["uri"],
+            "flexura:std/materials/rigur.mech"
+        );
+        assert_eq!((&related["id"], &related["message"]["text"]), (&json!(1), &json!("see here")));
+        let warning = &run["results"][1];
+        assert_eq!((&warning["ruleIndex"], &warning["level"]), (&json!(1), &json!("warning")));
+        assert!(warning.get("relatedLocations").is_none());
     }
 
     #[test]

@@ -13,6 +13,8 @@ pub struct Word {
     pub is_name: bool,
     /// Whether a space stands before it where it is shown.
     pub spaced: bool,
+    /// Whether it ends one of several things between braces: shown by a comma, whatever the text has there.
+    pub ends: bool,
 }
 
 /// A statement, a field of a record, a term of `minimize`, or the heading of a declaration.
@@ -47,6 +49,9 @@ pub fn shown(words: &[Word]) -> String {
             out.push(' ');
         }
         out.push_str(&word.text);
+        if word.ends {
+            out.push(',');
+        }
     }
     out
 }
@@ -232,10 +237,11 @@ impl Reader<'_> {
     fn words(&self, node: &Node) -> Vec<Word> {
         let mut words: Vec<Word> = Vec::new();
         let mut open: Vec<char> = Vec::new();
-        let mut spaced = false;
+        let (mut spaced, mut ended) = (false, false);
         node.leaves(&mut |leaf| {
             if leaf.kind.is_trivia() {
                 spaced = true;
+                ended |= leaf.kind == Kind::Newline && open.last() == Some(&'{');
                 return;
             }
             let text = self.of(leaf);
@@ -243,9 +249,12 @@ impl Reader<'_> {
                 "" => return,
                 "{" => open.push('{'),
                 "(" => open.push('('),
-                "}" | ")" => drop(open.pop()),
+                "}" | ")" => {
+                    ended = false;
+                    open.pop();
+                }
                 "," if open.last() == Some(&'{') => {
-                    spaced = true;
+                    (spaced, ended) = (true, true);
                     return;
                 }
                 _ => {}
@@ -265,8 +274,11 @@ impl Reader<'_> {
                 _ => spaced,
             };
             let is_name = leaf.kind == Kind::Ident;
-            words.push(Word { text, is_name, spaced: spaced_here });
-            spaced = false;
+            if let Some(last) = words.last_mut().filter(|w| ended && w.text != "{") {
+                last.ends = true;
+            }
+            words.push(Word { text, is_name, spaced: spaced_here, ends: false });
+            (spaced, ended) = (false, false);
         });
         words
     }

@@ -6,6 +6,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Two declarations that agree this much, in themselves and in their uses, are taken for one with another name.
 const ALIKE: f64 = 0.6;
+/// Of more pairs than this none is looked at: so much has changed that nothing is called otherwise any more. (A leg of
+/// eleven links rewritten from nothing has about 600.)
+const MOST_PAIRS: usize = 4000;
 
 /// What [`compare`] gives.
 pub struct Found {
@@ -89,12 +92,14 @@ fn by_place(entries: &[Entry]) -> BTreeMap<Place, Vec<&Entry>> {
 fn likeliest(old: &[Entry], new: &[Entry]) -> Option<(Entry, Entry)> {
     let places = |entries: &[Entry]| entries.iter().map(place).collect::<BTreeSet<_>>();
     let (had, has) = (places(old), places(new));
+    let gone: Vec<&Entry> = old.iter().filter(|e| e.declares && !has.contains(&place(e))).collect();
+    let come: Vec<&Entry> = new.iter().filter(|e| e.declares && !had.contains(&place(e))).collect();
+    if gone.len() * come.len() > MOST_PAIRS {
+        return None;
+    }
     let mut best: Option<(f64, &Entry, &Entry)> = None;
-    for from in old.iter().filter(|e| e.declares && !has.contains(&place(e))) {
-        let fits = |e: &&Entry| {
-            e.declares && e.kind == from.kind && e.scope == from.scope && !had.contains(&place(e))
-        };
-        for to in new.iter().filter(fits) {
+    for from in gone {
+        for to in come.iter().filter(|e| e.kind == from.kind && e.scope == from.scope) {
             let score = agreement(old, new, from, to);
             if score >= ALIKE && best.is_none_or(|(most, ..)| score > most) {
                 best = Some((score, from, to));

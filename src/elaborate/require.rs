@@ -10,7 +10,7 @@ use crate::syntax::ast::{Argument, Compare, Expr, ExprKind, Ident};
 use std::collections::BTreeMap;
 
 const AGGREGATES: &[&str] = &["max", "min", "mean", "span", "at"];
-const LATER_QUANTITIES: &[&str] = &["buckling"];
+const LATER_QUANTITIES: &[&str] = &["buckling", "robust"];
 const QUANTITIES: &[&str] = &["error", "stress", "torque", "force", "tension", "gap", "angle"];
 /// A query as written: `max(error(tip))`.
 struct Query<'a> {
@@ -64,6 +64,9 @@ impl<'a> Evaluator<'a> {
                 );
             }
         };
+        if LATER_QUANTITIES.contains(&found.inner.node.as_str()) {
+            return self.later(codes::LATER_TERM, &found.inner.node, found.inner.at);
+        }
         let aggregate = self.aggregate(scope, &found);
         let quantity = if found.output {
             let outputs = self.aims.outputs.clone();

@@ -184,7 +184,24 @@ fn run_build(
     Some(())
 }
 
-/// Text to a design without errors.
+/// Findings of the variants that the design as it stands has not.
+fn check_variants(request: &Request, stages: &dyn Stages, files: &dyn Files, out: &mut BuildOutcome) {
+    for variant in out.variants.clone() {
+        let mut other = BuildOutcome::default();
+        let request = Request { variant: Some(variant.clone()), ..request.clone() };
+        front_end(&request, stages, files, &mut other);
+        for mut d in other.diagnostics {
+            let place = |d: &Diagnostic| d.labels.first().map(|l| l.at);
+            let same = |o: &Diagnostic| o.code == d.code && o.message == d.message && place(o) == place(&d);
+            if !out.diagnostics.iter().any(same) {
+                d.message.push_str(&format!(" (variant `{variant}`)"));
+                out.diagnostics.push(d);
+            }
+        }
+    }
+}
+
+/// Text to a design without errors, and where no variant is chosen, all its variants too.
 pub fn check(request: &Request, stages: &dyn Stages, files: &dyn Files) -> BuildOutcome {
     let mut out = BuildOutcome::default();
     if let Some(assembly) = front_end(request, stages, files, &mut out) {
@@ -192,6 +209,9 @@ pub fn check(request: &Request, stages: &dyn Stages, files: &dyn Files) -> Build
         let simulated = lints::from_lock(request, &assembly, stages, &mut out);
         if let Some((values, simulations)) = simulated {
             lints::solved(&assembly, &values, &simulations, stages, &mut out);
+        }
+        if request.variant.is_none() {
+            check_variants(request, stages, files, &mut out);
         }
     }
     lints::finish(request, &mut out);

@@ -170,9 +170,17 @@ fn statements_of_the_whole_language_are_known_by_their_keyword() {
         mount xl320 on a at S
         string cable: a at C1 to palm via C2
         variant ring {
-            param x = 1
+            x = 1
+            knee.thickness = 2 mm, y = 3
         }
         assert x < 2 \"message { not closed\"
+        case heavy {
+            load 1 N along x on a at S
+        }
+        for i in 0 .. 4 {
+            place finger[i] = one at (i * 20 mm, 0 mm)
+            mirror left[ i + 1 ] = finger[i] across yz
+        }
         drive servo by keys linear {
             0 %: 0 deg, 25 %: 35 deg
         } with xl320 continuous
@@ -200,6 +208,19 @@ fn statements_of_the_whole_language_are_known_by_their_keyword() {
                 format!("{} keys {:?} {continuous}", keys.len(), motor.as_ref().map(|m| m.node.as_str()))
             }
             StatementKind::Load(_) => "load".into(),
+            StatementKind::Variant(variant) => {
+                let set: Vec<&str> = variant.settings.iter().map(|(path, _)| path.node.as_str()).collect();
+                format!("variant {} {set:?}", variant.name.node)
+            }
+            StatementKind::Assert(assert) => format!("assert {}", assert.message.node),
+            StatementKind::For(text) => {
+                let names = text.statements.iter().map(|s| match &s.kind {
+                    StatementKind::Place(place) => place.name.node.as_str(),
+                    StatementKind::Mirror(mirror) => mirror.name.node.as_str(),
+                    other => panic!("{other:?}"),
+                });
+                format!("for {} {:?}", text.variable.node, names.collect::<Vec<_>>())
+            }
             StatementKind::String(cable) => format!("string via {}", cable.via.len()),
             StatementKind::Drive { drum: Some(_), continuous, .. } => format!("drum {continuous}"),
             other => panic!("{other:?}"),
@@ -212,8 +233,10 @@ fn statements_of_the_whole_language_are_known_by_their_keyword() {
             "mirror left right yz [\"a\", \"b\"]",
             "mount",
             "string via 1",
-            "variant",
-            "assert",
+            "variant ring [\"x\", \"knee.thickness\", \"y\"]",
+            "assert message { not closed",
+            "case",
+            "for i [\"finger[i]\", \"left[i+1]\"]",
             "2 keys Some(\"xl320\") true",
             "drum false",
             "load"
