@@ -10,6 +10,7 @@ pub mod equilibrium;
 pub mod geometry;
 pub mod ir;
 pub mod kinematics;
+pub mod lsp;
 pub mod math;
 pub mod optimize;
 pub mod pipeline;

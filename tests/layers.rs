@@ -43,7 +43,10 @@ fn each_dependency_is_seen_by_one_folder() {
         ("boolmesh", "geometry/"),
         ("minijinja", "emit/arduino/"),
         ("stl_io", "emit/"),
+        ("lsp_server", "lsp/"),
+        ("lsp_types", "lsp/"),
         ("clap", "cli/"),
+        ("notify", "cli/"),
         ("indicatif", "cli/"),
         ("ctrlc", "cli/"),
     ] {

@@ -7,6 +7,7 @@ mod config;
 mod fmt;
 mod human;
 mod interrupt;
+mod lsp;
 mod manners;
 mod progress;
 mod released;
@@ -71,6 +72,8 @@ enum Command {
     Completions(shells::Completions),
     /// Print the manual pages
     Man(shells::Man),
+    /// Speak with an editor: the language server, on the standard input and output
+    Lsp(lsp::Lsp),
 }
 
 const EXAMPLES: &str = "Examples:
@@ -238,6 +241,7 @@ fn configured(mut cli: Cli, matches: &clap::ArgMatches) -> u8 {
         Command::Fmt(arguments) => fmt::fmt(arguments),
         Command::Completions(arguments) => shells::completions(arguments),
         Command::Man(arguments) => shells::man(arguments),
+        Command::Lsp(arguments) => lsp::lsp(arguments),
     };
     match threads {
         None => run(),

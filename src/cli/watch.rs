@@ -24,7 +24,9 @@ const LOOK: Duration = Duration::from_secs(2);
 pub fn watch(run: impl Fn() -> u8) -> u8 {
     let (sender, events) = channel();
     // It matters only that something happened.
-    let mut watcher = notify::recommended_watcher(move |_| drop(sender.send(())))
+    let mut watcher = notify::recommended_watcher(move |_| {
+        let _ = sender.send(());
+    })
         .inspect_err(|e| {
             let d = placeless(Severity::Warning, "W0753", format!("the system cannot watch files: {e}"));
             render::show(&[d.help("they are looked at every two seconds")], &SourceMap::default());

@@ -437,6 +437,11 @@ fn list(names: &[String]) -> String {
     names.iter().map(|n| format!("`std.{n}`")).collect::<Vec<_>>().join(", ")
 }
 
+/// The text of a file of the standard library, such as `materials/rigur.mech`.
+pub fn std_source(path: &str) -> Option<&'static str> {
+    STDLIB.get_file(path)?.contents_utf8()
+}
+
 /// Dotted paths of all standard modules without the leading `std.`, sorted.
 pub fn std_modules() -> Vec<String> {
     fn walk(dir: &Dir<'_>, out: &mut Vec<String>) {

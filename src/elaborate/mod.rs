@@ -17,6 +17,7 @@ mod functions;
 mod goals;
 mod graph;
 mod instances;
+mod known;
 mod load;
 mod loads;
 mod lookup;
@@ -48,7 +49,8 @@ mod value;
 use crate::diagnostic::{Diagnostic, Origin, SourceMap};
 use crate::ir::{Assembly, Design};
 use crate::syntax::ast::{Item, Mechanism};
-pub use load::std_modules;
+pub use known::{KnownValue, quantity};
+pub use load::{std_modules, std_source};
 use settings::Settings;
 use std::fmt;
 
@@ -115,6 +117,8 @@ pub struct Elaborated {
     pub design: Option<Design>,
     /// Every text that was read: the root file first, then imports, then `--set` values.
     pub sources: SourceMap,
+    /// What names came to, also where there are errors elsewhere.
+    pub values: Vec<KnownValue>,
     /// Findings of parsing and elaboration, in the order of the files and places.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -127,11 +131,12 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
     let program = load::load(root, files, &mut sources, &mut diagnostics);
     let settings = Settings::parse(&options.set, &mut sources, &mut diagnostics);
     let Some(module) = program.root.and_then(|i| Some((i, program.modules.get(i)?))) else {
-        return Elaborated { assembly: None, design: None, sources, diagnostics };
+        return Elaborated { assembly: None, design: None, sources, values: Vec::new(), diagnostics };
     };
     let (root_index, root_module) = module;
     let outside = mechanism::Outside { module: root_index, steps: options.steps, sources: &sources, files };
     let circular = placing::circles(&program, root_index, &mut diagnostics);
+    let mut values = Vec::new();
     let (mut assembly, mut used) = (None, std::collections::BTreeSet::new());
     let no_settings = Settings::default();
     let (built, others) = roles(&program, root_index);
@@ -145,10 +150,12 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
             if is_root {
                 evaluator.unused_settings();
             }
+            let values = evaluator.known();
             let (out, used) = (evaluator.out, evaluator.used);
-            instances::Assembled { assembly: design.map(Assembly::of), out, used }
+            instances::Assembled { assembly: design.map(Assembly::of), out, used, values }
         };
         used.append(&mut found.used);
+        values.append(&mut found.values);
         diagnostics.append(&mut found.out);
         if is_root {
             assembly = found.assembly;
@@ -178,7 +185,7 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
     }
     tidy(&mut diagnostics);
     let design = assembly.as_ref().and_then(Assembly::single).cloned();
-    Elaborated { assembly, design, sources, diagnostics }
+    Elaborated { assembly, design, sources, values, diagnostics }
 }
 
 /// What a file builds, and the mechanisms that have to be checked by themselves because it does not place them.
