@@ -27,11 +27,11 @@ pub fn watch(run: impl Fn() -> u8) -> u8 {
     let mut watcher = notify::recommended_watcher(move |_| {
         let _ = sender.send(());
     })
-        .inspect_err(|e| {
-            let d = placeless(Severity::Warning, "W0753", format!("the system cannot watch files: {e}"));
-            render::show(&[d.help("they are looked at every two seconds")], &SourceMap::default());
-        })
-        .ok();
+    .inspect_err(|e| {
+        let d = placeless(Severity::Warning, "W0753", format!("the system cannot watch files: {e}"));
+        render::show(&[d.help("they are looked at every two seconds")], &SourceMap::default());
+    })
+    .ok();
     let mut folders = BTreeSet::new();
     loop {
         sources::forget();
