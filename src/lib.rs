@@ -13,6 +13,7 @@ pub mod geometry;
 pub mod ir;
 pub mod kinematics;
 pub mod lint;
+pub mod lsp;
 pub mod math;
 pub mod optimize;
 pub mod pipeline;

@@ -14,6 +14,7 @@ mod human;
 mod interrupt;
 mod junit;
 mod lints;
+mod lsp;
 mod manners;
 mod new;
 mod progress;
@@ -94,6 +95,8 @@ enum Command {
     Completions(shells::Completions),
     /// Print the manual pages
     Man(shells::Man),
+    /// Speak with an editor: the language server, on the standard input and output
+    Lsp(lsp::Lsp),
 }
 
 const EXAMPLES: &str = "Examples:
@@ -283,6 +286,7 @@ fn configured(mut cli: Cli, matches: &clap::ArgMatches) -> u8 {
         Command::Explain(arguments) => explain::explain(arguments),
         Command::Completions(arguments) => shells::completions(arguments),
         Command::Man(arguments) => shells::man(arguments),
+        Command::Lsp(arguments) => lsp::lsp(arguments),
     };
     match threads {
         None => run(),

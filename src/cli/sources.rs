@@ -25,6 +25,11 @@ impl Folder {
         Ok((Self { root }, name))
     }
 
+    /// A folder by its path.
+    pub fn at(folder: &Path) -> Result<Self, FileError> {
+        Ok(Self { root: folder.canonicalize().map_err(|e| reason(&e))? })
+    }
+
     /// The folder itself, without symbolic links.
     pub fn root(&self) -> &Path {
         &self.root

@@ -96,6 +96,8 @@ pub struct Evaluator<'a> {
     pub(super) scale: f64,
     /// … but not what is evaluated while this is set: records, bought parts, goals.
     pub(super) as_is: bool,
+    /// What names came to in the mechanisms that this one places.
+    pub(super) placed_values: Vec<super::KnownValue>,
 }
 
 impl<'a> Evaluator<'a> {
@@ -124,6 +126,7 @@ impl<'a> Evaluator<'a> {
             sliders: BTreeSet::new(),
             starts: (Vec::new(), Vec::new()),
             scale: 1.0,
+            placed_values: Vec::new(),
             as_is: false,
         }
     }

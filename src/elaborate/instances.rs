@@ -33,6 +33,8 @@ pub struct Assembled {
     pub out: Vec<Diagnostic>,
     /// Uses that brought a name that was needed: (module, use).
     pub used: BTreeSet<(usize, usize)>,
+    /// What names came to.
+    pub values: Vec<super::KnownValue>,
 }
 
 /// An item of the program: module and index.
@@ -99,7 +101,8 @@ pub fn assemble(
         e.unused_settings();
     }
     let bad = e.out.iter().any(Diagnostic::is_error);
-    Assembled { assembly: assembly.filter(|_| !bad), out: e.out, used: e.used }
+    let values = e.known();
+    Assembled { assembly: assembly.filter(|_| !bad), out: e.out, used: e.used, values }
 }
 
 impl<'a> Evaluator<'a> {
@@ -325,6 +328,9 @@ impl<'a> Evaluator<'a> {
                     text: format!("scaled by {scale} here"),
                 });
             }
+        }
+        if scale == 1.0 {
+            self.placed_values.append(&mut inner.known());
         }
         self.out.append(&mut inner.out);
         self.used.append(&mut inner.used);

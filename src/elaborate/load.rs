@@ -450,6 +450,11 @@ pub fn std_text(module: &str) -> Option<&'static str> {
     STDLIB.get_file(format!("{}.mech", module.replace('.', "/")))?.contents_utf8()
 }
 
+/// The text of a file of the standard library, such as `materials/rigur.mech`.
+pub fn std_source(path: &str) -> Option<&'static str> {
+    STDLIB.get_file(path)?.contents_utf8()
+}
+
 /// Dotted paths of all standard modules without the leading `std.`, sorted.
 pub fn std_modules() -> Vec<String> {
     fn walk(dir: &Dir<'_>, out: &mut Vec<String>) {

@@ -19,6 +19,7 @@ mod given;
 mod goals;
 mod graph;
 mod instances;
+mod known;
 mod load;
 mod loads;
 mod lookup;
@@ -52,7 +53,8 @@ mod variants;
 use crate::diagnostic::{Diagnostic, Edit, Fix, Origin, SourceMap};
 use crate::ir::{Assembly, Design};
 use crate::syntax::ast::{self, Item, Mechanism};
-pub use load::{std_modules, std_text};
+pub use known::{KnownValue, quantity};
+pub use load::{std_modules, std_source, std_text};
 use settings::Settings;
 use std::fmt;
 
@@ -125,6 +127,8 @@ pub struct Elaborated {
     pub sources: SourceMap,
     /// The design's own files as understood, the root file first.
     pub files: Vec<OwnFile>,
+    /// What names came to, also where there are errors elsewhere.
+    pub values: Vec<KnownValue>,
     /// Findings of parsing and elaboration, in the order of the files and places.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -154,12 +158,14 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
             variants: Vec::new(),
             sources,
             files: Vec::new(),
+            values: Vec::new(),
             diagnostics,
         };
     };
     let (root_index, root_module) = module;
     let outside = mechanism::Outside { module: root_index, steps: options.steps, sources: &sources, files };
     let circular = placing::circles(&program, root_index, &mut diagnostics);
+    let mut values = Vec::new();
     let (mut assembly, mut used) = (None, std::collections::BTreeSet::new());
     let no_settings = Settings::default();
     let (built, others) = roles(&program, root_index);
@@ -183,6 +189,7 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
             }
         }
         used.append(&mut found.used);
+        values.append(&mut found.values);
         diagnostics.append(&mut found.out);
         if is_root {
             assembly = found.assembly;
@@ -219,7 +226,7 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
         files.push(OwnFile { id: module.file_id, path: module.path, ast: module.file });
     }
     files.sort_by_key(|f| f.id);
-    Elaborated { assembly, design, variants, sources, files, diagnostics }
+    Elaborated { assembly, design, variants, sources, files, values, diagnostics }
 }
 
 /// The repair that takes a statement out.
@@ -244,8 +251,9 @@ fn elaborated(
     if is_root {
         evaluator.unused_settings();
     }
+    let values = evaluator.known();
     let (out, used) = (evaluator.out, evaluator.used);
-    instances::Assembled { assembly: design.map(Assembly::of), out, used }
+    instances::Assembled { assembly: design.map(Assembly::of), out, used, values }
 }
 
 /// What a file builds, and the mechanisms that have to be checked by themselves because it does not place them.

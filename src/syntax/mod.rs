@@ -57,3 +57,8 @@ fn unread(text: &str, diagnostic: Diagnostic) -> Parse {
     let tree = Node { kind: Kind::File, start: 0, end, children: Box::new([leaf]) };
     Parse { tree, file: ast::File::default(), diagnostics: vec![diagnostic] }
 }
+
+/// How a statement is written, by the word it starts with.
+pub fn statement_form(word: &str) -> Option<&'static str> {
+    words::form(word)
+}
