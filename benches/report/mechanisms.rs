@@ -1,6 +1,6 @@
 //! The six mechanisms: a cycle, an iteration, a whole optimisation from the design's own start, the printed parts.
 
-use super::designs::{NAMES, example, layout, solved, starts};
+use super::designs::{NAMES, OPTIMISED, example, layout, solved, starts};
 use super::{MILLI, Report, Time, WHOLE, once};
 use flexura::equilibrium::{Model, sweep};
 use flexura::ir::{Design, ExportKind};
@@ -31,7 +31,7 @@ pub fn cycles(report: &mut Report) {
 
 /// One cycle with the derivatives of all terms.
 pub fn iterations(report: &mut Report) {
-    for name in NAMES {
+    for name in OPTIMISED {
         for design in &example(name).designs {
             let layout = layout(design);
             let problem = Problem::new(design, &layout, EDGES);
@@ -47,7 +47,7 @@ pub fn iterations(report: &mut Report) {
 
 /// As `flexura build --fresh` optimises.
 pub fn optimisations(report: &mut Report) {
-    for name in NAMES {
+    for name in OPTIMISED {
         let (mut seconds, mut iterations, mut ended) = (0.0, 0, true);
         let assembly = example(name);
         for design in &assembly.designs {

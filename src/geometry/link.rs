@@ -9,7 +9,7 @@ use super::anchor::{Anchor, FlexureEnd, Follow, SizeBy};
 use super::distance::nearer_than;
 use super::mesh::Mesh;
 use super::parts::{Bore, Eye, FLOOR_MM, FlexureSolid, GeometryError, PartsInput};
-use super::riser::Near;
+use super::riser::Moving;
 use super::skeleton::connect;
 use super::slot::{Facets, Slot};
 use nalgebra::Vector3;
@@ -165,7 +165,7 @@ pub(super) struct Builder<'a> {
     pub(super) level: f64,
     pub(super) index: usize,
     /// What moves beside the body, seen from it; found when first asked for.
-    pub(super) moving: OnceCell<Vec<Near>>,
+    pub(super) moving: OnceCell<Moving>,
     /// What flexures' own bodies are made of; found when first asked for.
     pub(super) of_flexures: OnceCell<Vec<Slot>>,
     /// Places of eyes in other layers that cannot be reached straight.

@@ -16,6 +16,7 @@ use super::parts::{BodySolid, Eye, FlexureSolid};
 use super::slot::Slot;
 use crate::math::Pose;
 use nalgebra::{Rotation3, Unit, Vector3};
+use std::cell::OnceCell;
 use std::f64::consts::TAU;
 
 /// Radius of a riser beside something, as a part of a bar's half width.
@@ -45,74 +46,141 @@ impl Near {
     }
 }
 
+/// Everything that moves beside a body, in every state.
+pub(super) struct Moving {
+    /// Per state the poses of all bodies, seen from this one.
+    seen: Vec<Vec<Pose>>,
+    /// Flexures and the other bodies at rest.
+    flexures: Vec<Vec<Slot>>,
+    bodies: Vec<Vec<Slot>>,
+    bundles: Vec<Bundle>,
+}
+
+/// A flexure or a body in one state: a ball that holds it, and what it is made of, found when first asked for.
+struct Bundle {
+    state: usize,
+    what: What,
+    center: Vector3<f64>,
+    radius: f64,
+    near: OnceCell<Vec<Near>>,
+}
+
+#[derive(Clone, Copy)]
+enum What {
+    Flexure(usize),
+    Body(usize),
+}
+
+/// A ball round slots; none round nothing.
+fn sphere(slots: &[Slot]) -> Option<(Vector3<f64>, f64)> {
+    let center = slots.iter().map(|s| (s.start + s.end) * 0.5).sum::<Vector3<f64>>() / slots.len() as f64;
+    let reach = |s: &Slot| {
+        let thick = s.disc_radius_mm.hypot(s.half_height_mm) + s.round_mm;
+        (s.start - center).norm().max((s.end - center).norm()) + thick
+    };
+    slots.iter().map(reach).reduce(f64::max).map(|radius| (center, radius))
+}
+
+/// Whether a slot is nearer to one of the others than a bound.
+fn nearer<'n>(slot: &Slot, gap_mm: f64, near: impl IntoIterator<Item = &'n Near>) -> bool {
+    let (center, radius) = slot.bounding_sphere();
+    near.into_iter().any(|n| {
+        (n.center - center).norm() - n.radius - radius < gap_mm
+            && slot.signed_distance(&n.center) - n.radius < gap_mm + SURELY_MM
+            && nearer_than(&n.slot, slot, gap_mm)
+    })
+}
+
 impl Builder<'_> {
     /// Whether a slot of this body overlaps something in some state.
     pub(super) fn meets_moving(&self, slot: &Slot) -> bool {
-        self.nearer_than(slot, -OVERLAP_MM, self.moving())
-    }
-
-    fn nearer_than<'n>(&self, slot: &Slot, gap_mm: f64, near: impl IntoIterator<Item = &'n Near>) -> bool {
+        let moving = self.moving();
         let (center, radius) = slot.bounding_sphere();
-        near.into_iter().any(|n| {
-            (n.center - center).norm() - n.radius - radius < gap_mm
-                && slot.signed_distance(&n.center) - n.radius < gap_mm + SURELY_MM
-                && nearer_than(&n.slot, slot, gap_mm)
-        })
+        let within = |b: &&Bundle| (b.center - center).norm() - b.radius - radius < SURELY_MM - OVERLAP_MM;
+        moving.bundles.iter().filter(within).any(|b| nearer(slot, -OVERLAP_MM, self.near(moving, b)))
     }
 
     /// Everything that moves, in every state, seen from this body.
-    fn moving(&self) -> &[Near] {
+    fn moving(&self) -> &Moving {
         self.moving.get_or_init(|| {
             let still = vec![vec![Pose::rest(Vector3::zeros()); self.input.bodies.len()]];
             let states = if self.input.motion.is_empty() { &still } else { &self.input.motion };
-            let straight: Vec<Vec<Slot>> = self.input.flexures.iter().map(FlexureSolid::slots).collect();
-            let others: Vec<(usize, Vec<Slot>)> = (self.input.bodies.iter().enumerate())
-                .filter(|(b, _)| *b != self.index)
-                .map(|(b, body)| (b, self.rough(b, body)))
-                .collect();
-            let mut near = Vec::new();
-            for poses in states {
-                let Some(own) = poses.get(self.index) else { continue };
-                let seen: Vec<Pose> = poses.iter().map(|p| from(own, p)).collect();
-                for (flexure, slots) in self.input.flexures.iter().zip(&straight) {
-                    near.extend(self.bent(flexure, slots, &seen).map(Near::new));
+            let seen = states.iter().filter_map(|poses| {
+                let own = poses.get(self.index)?;
+                Some(poses.iter().map(|p| from(own, p)).collect())
+            });
+            let flexures: Vec<Vec<Slot>> = self.input.flexures.iter().map(FlexureSolid::slots).collect();
+            let bodies = self
+                .input
+                .bodies
+                .iter()
+                .enumerate()
+                .map(|(b, body)| if b == self.index { Vec::new() } else { self.rough(b, body) });
+            let mut moving =
+                Moving { seen: seen.collect(), flexures, bodies: bodies.collect(), bundles: Vec::new() };
+            let spheres = |slots: &[Vec<Slot>]| slots.iter().map(|s| sphere(s)).collect::<Vec<_>>();
+            let [flexures, bodies] = [&moving.flexures, &moving.bodies].map(|slots| spheres(slots));
+            for (state, seen) in moving.seen.iter().enumerate() {
+                let at = |what, center, radius| Bundle { state, what, center, radius, near: OnceCell::new() };
+                for (f, ball) in flexures.iter().enumerate() {
+                    let bodies = self.input.flexures[f].bodies;
+                    let (Some(a), Some(b), Some((c, r))) = (seen.get(bodies.0), seen.get(bodies.1), ball)
+                    else {
+                        continue;
+                    };
+                    // Each of its points lies between where either end would carry it.
+                    let (a, b) = (a.point(c), b.point(c));
+                    let radius = r + 0.5 * (a - b).norm();
+                    moving.bundles.push(at(What::Flexure(f), (a + b) * 0.5, radius));
                 }
-                for (b, slots) in &others {
-                    near.extend(slots.iter().map(|s| Near::new(s.moved(&seen[*b]))));
+                for (b, ball) in bodies.iter().enumerate() {
+                    if let Some((c, r)) = ball {
+                        moving.bundles.push(at(What::Body(b), seen[b].point(c), *r));
+                    }
                 }
             }
-            near
+            moving
+        })
+    }
+
+    /// What a bundle is made of.
+    fn near<'n>(&self, moving: &'n Moving, bundle: &'n Bundle) -> &'n [Near] {
+        bundle.near.get_or_init(|| {
+            let seen = &moving.seen[bundle.state];
+            match bundle.what {
+                What::Flexure(f) => self.bent(&self.input.flexures[f], &moving.flexures[f], seen),
+                What::Body(b) => moving.bodies[b].iter().map(|s| Near::new(s.moved(&seen[b]))).collect(),
+            }
         })
     }
 
     /// A flexure, as `slots` at rest, as the motion of its two bodies bends it, about: near each end it follows the
     /// body there.
-    fn bent<'s>(
-        &'s self,
-        flexure: &'s FlexureSolid,
-        slots: &'s [Slot],
-        seen: &'s [Pose],
-    ) -> impl Iterator<Item = Slot> + 's {
-        let bodies = seen.get(flexure.bodies.0).zip(seen.get(flexure.bodies.1));
+    fn bent(&self, flexure: &FlexureSolid, slots: &[Slot], seen: &[Pose]) -> Vec<Near> {
+        let (Some(a), Some(b)) = (seen.get(flexure.bodies.0), seen.get(flexure.bodies.1)) else {
+            return Vec::new();
+        };
         let count = slots.len().max(1) as f64;
         let ends = [(flexure.bodies.0, false), (flexure.bodies.1, true)];
-        let root = move |p: &Vector3<f64>| {
-            let mut own = ends.iter().filter(|(body, _)| *body == self.index);
-            own.any(|(_, at_end)| (flexure.end_point(*at_end) - p).norm() < ROOT_MM)
+        let root = |p: &Vector3<f64>| {
+            let own = ends.iter().filter(|(body, _)| *body == self.index);
+            own.clone().any(|(_, at_end)| (flexure.end_point(*at_end) - p).norm() < ROOT_MM)
         };
-        bodies.into_iter().flat_map(move |(a, b)| {
-            let place = move |p: &Vector3<f64>, u: f64| {
-                let w = u * u * (3.0 - 2.0 * u);
-                a.point(p).lerp(&b.point(p), w)
-            };
-            let free = slots.iter().enumerate().filter(move |(_, s)| !root(&s.start) && !root(&s.end));
-            free.map(move |(i, s)| {
+        let place = |p: &Vector3<f64>, u: f64| {
+            let w = u * u * (3.0 - 2.0 * u);
+            a.point(p).lerp(&b.point(p), w)
+        };
+        slots
+            .iter()
+            .enumerate()
+            .filter(|(_, s)| !root(&s.start) && !root(&s.end))
+            .map(|(i, s)| {
                 let (u, v) = (i as f64 / count, (i + 1) as f64 / count);
                 let axis = a.direction(&s.axis).lerp(&b.direction(&s.axis), u);
                 let axis = axis.try_normalize(1e-9).unwrap_or(s.axis);
-                Slot { start: place(&s.start, u), end: place(&s.end, v), axis, ..*s }
+                Near::new(Slot { start: place(&s.start, u), end: place(&s.end, v), axis, ..*s })
             })
-        })
+            .collect()
     }
 
     /// Another body before it is planned: its eyes, the bars between those in its own layer, its sleeves and stubs.
@@ -219,11 +287,14 @@ impl Builder<'_> {
         let axis = self.axis();
         let reach = DISTANCES as f64 * DISTANCE_STEP_MM + radius + self.input.clearance_mm;
         let level = from.dot(&axis);
-        let far = |n: &&Near| {
-            let off = n.center - from;
-            (off - axis * off.dot(&axis)).norm() < reach + n.radius
+        let within = |center: &Vector3<f64>, radius: f64| {
+            let off = center - from;
+            (off - axis * off.dot(&axis)).norm() < reach + radius
         };
-        let near: Vec<&Near> = self.moving().iter().filter(far).collect();
+        let moving = self.moving();
+        let bundles = moving.bundles.iter().filter(|b| within(&b.center, b.radius + SURELY_MM));
+        let near = bundles.flat_map(|b| self.near(moving, b)).filter(|n| within(&n.center, n.radius));
+        let near: Vec<&Near> = near.collect();
         let first = super::slot::any_normal(&axis);
         let mut places: Vec<(f64, Vector3<f64>)> = Vec::new();
         for k in 0..DIRECTIONS {
@@ -242,7 +313,7 @@ impl Builder<'_> {
         let free = |place: &Vector3<f64>| {
             let column = self.column_slot(&self.at_level(place, level), span, radius);
             let near = || near.iter().copied();
-            !self.nearer_than(&column, gap, near()) && !self.nearer_than(&arm(place), gap, near())
+            !nearer(&column, gap, near()) && !nearer(&arm(place), gap, near())
         };
         places.into_iter().map(|(_, p)| p).find(free)
     }

@@ -52,6 +52,8 @@ pub struct RodSystem {
     pub(crate) factors: BandedLdl,
     /// Columns 0..6: L⁻¹ of the coupling to link A; column 6: L⁻¹ of the internal gradient.
     pub(crate) reduced: Vec<[f64; 8]>,
+    /// Of the gradient alone, where link A is held.
+    pub(crate) reduced_gradient: Vec<[f64; 1]>,
     /// L⁻¹ of the coupling to link B, whose rows before the last [`END_COUPLING`] are zero.
     pub(crate) reduced_b: [[f64; 6]; END_COUPLING],
     pub(crate) condensed_gradient: SVector<f64, 12>,
@@ -125,6 +127,7 @@ impl RodSystem {
             link_hessian: SMatrix::zeros(),
             factors: BandedLdl::new(internal),
             reduced: vec![[0.0; 8]; internal + HALF_BANDWIDTH],
+            reduced_gradient: Vec::new(),
             reduced_b: [[0.0; 6]; END_COUPLING],
             condensed_gradient: SVector::zeros(),
             condensed_hessian: SMatrix::zeros(),

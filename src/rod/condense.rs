@@ -95,6 +95,50 @@ impl RodSystem {
         (&self.condensed_gradient, &self.condensed_hessian)
     }
 
+    /// As [`Self::condense`] while link A is held: gradient (6) and Hessian (6 by 6) by du_B, dφ_B. What the inside
+    /// does to link A is not worked out; [`Self::back_substitute`] then serves increments of B alone.
+    pub fn condense_end(&mut self) -> (SVector<f64, 6>, SMatrix<f64, 6, 6>) {
+        if self.shear.is_some() {
+            let (gradient, hessian) = self.condense();
+            return (gradient.fixed_rows::<6>(6).into(), hessian.fixed_view::<6, 6>(6, 6).into());
+        }
+        let n = self.factors.order();
+        let b = self.coupling(1);
+        let mut residual = std::mem::take(&mut self.reduced_gradient);
+        residual.resize(n + HALF_BANDWIDTH, [0.0; 1]);
+        for (to, from) in residual.iter_mut().zip(&self.gradient[FIRST_INTERNAL..4 * self.n - 4]) {
+            to[0] = *from;
+        }
+        residual[n..].fill([0.0; 1]);
+        self.factors.forward(&mut residual, 0);
+        for (row, [g]) in self.reduced.iter_mut().zip(&residual) {
+            *row = [0.0; 8];
+            row[6] = *g;
+        }
+        self.reduced_gradient = residual;
+        self.forward_b(&b);
+        let inverse = self.factors.inverse_pivots();
+        let first_b = n - END_COUPLING;
+        let mut gradient: SVector<f64, 6> = self.link_gradient.fixed_rows::<6>(6).into();
+        let mut by_inside = SVector::<f64, 6>::zeros();
+        let mut bb = SMatrix::<f64, 6, 6>::zeros();
+        for (i, yb) in self.reduced_b.iter().enumerate() {
+            let d = inverse[first_b + i];
+            let own = self.reduced[first_b + i][6];
+            for r in 0..6 {
+                let s = yb[r] * d;
+                by_inside[r] += s * own;
+                for c in 0..6 {
+                    bb[(r, c)] += s * yb[c];
+                }
+            }
+        }
+        gradient -= by_inside;
+        let mut hessian: SMatrix<f64, 6, 6> = self.link_hessian.fixed_view::<6, 6>(6, 6).into();
+        hessian -= (bb + bb.transpose()) * 0.5;
+        (gradient, (hessian + hessian.transpose()) * 0.5)
+    }
+
     /// Condenses what is in the band; with shear, [`Self::factor_shear`] goes on from there.
     pub(crate) fn condense_band(&mut self) {
         let n = self.factors.order();

@@ -223,9 +223,8 @@ impl SingleRod {
                 return Ok(iteration);
             }
             self.system.factor();
-            let (g, h) = self.system.condense();
-            let mut g6: SVector<f64, 6> = g.fixed_rows::<6>(6) + lg;
-            let mut h6: SMatrix<f64, 6, 6> = h.fixed_view::<6, 6>(6, 6) + lh;
+            let (g, h) = self.system.condense_end();
+            let (mut g6, mut h6) = (g + lg, h + lh);
             for (i, free) in free.into_iter().enumerate() {
                 if !free {
                     g6[i] = 0.0;

@@ -98,10 +98,14 @@ pub fn strips(
     if at.bounds.far(&bt.bounds, reach) || at.apart(bt, reach) {
         return None;
     }
+    within(a, b, reach, &Window::new(at, b, bt, reach))
+}
+
+/// The same, of what the window lets through.
+fn within(a: &Strip, b: &Strip, reach: f64, window: &Window) -> Option<(f64, [StripGradient; 2])> {
     let mut mean = 0.0;
     let mut by = [StripGradient::default(); 2];
     let share = 1.0 / (a.copies * b.copies) as f64;
-    let window = Window::new(at, b, bt, reach);
     for (s, weight) in a.samples() {
         let on_axis = a.ends[0] * (1.0 - s) + a.ends[1] * s;
         let seen = window.see(&on_axis);
@@ -262,4 +266,66 @@ pub fn link_jacobian(
     out.row_mut(9).copy_from(&capsule.d_spread_dp);
     out.row_mut(10).copy_from(&capsule.d_radius_dp);
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers in −1..1 from a counter.
+    fn noise(k: usize) -> f64 {
+        2.0 * ((k as f64 * 12.9898).sin() * 43758.5453).rem_euclid(1.0) - 1.0
+    }
+
+    fn strip(seed: usize) -> Strip {
+        let vector = |k: usize, size: f64| {
+            Vector3::new(noise(seed + k), noise(seed + k + 1), noise(seed + k + 2)) * size
+        };
+        let (middle, way) = (vector(0, 9.0), vector(3, 6.0));
+        // Lengths down to none, fans across and askew, single capsules.
+        let way = match seed % 5 {
+            0 => Vector3::zeros(),
+            1 => way * 1e-3,
+            _ => way,
+        };
+        let askew = vector(6, 1.0).normalize();
+        let across = (askew - way * (askew.dot(&way) / way.norm_squared().max(1e-12))).normalize();
+        Strip {
+            ends: [middle - way, middle + way],
+            fan: if seed.is_multiple_of(3) { askew } else { across },
+            spread: 2.0 * noise(seed + 9).abs(),
+            radius: 0.2 + noise(seed + 10).abs(),
+            copies: [1, 2, 5, 12][seed % 4],
+            panels: 1 + seed % 3,
+            capped: seed.is_multiple_of(2),
+        }
+    }
+
+    /// What is left out for being far away adds nothing: the sums are the same to the last bit.
+    #[test]
+    fn nothing_in_reach_is_left_out() {
+        let (mut met, mut missed) = (0, 0);
+        for k in 0..20_000 {
+            let (a, b) = (strip(31 * k), strip(31 * k + 17 + k % 7));
+            let gap = 0.5 + 0.5 * noise(k);
+            let (at, bt) = (Extent::new(&a), Extent::new(&b));
+            let reach = a.radius + b.radius + gap;
+            let all = within(&a, &b, reach, &Window::new(&at, &b, &bt, f64::INFINITY));
+            match (strips((&a, &at), (&b, &bt), gap), all) {
+                (Some((value, by)), Some((want, by_want))) => {
+                    assert_eq!(value.to_bits(), want.to_bits(), "{a:?} {b:?}");
+                    for (g, w) in by.iter().zip(&by_want) {
+                        assert_eq!((g.ends, g.fan), (w.ends, w.fan));
+                        assert_eq!((g.spread, g.radius), (w.spread, w.radius));
+                    }
+                    met += 1;
+                }
+                (None, None) => missed += 1,
+                // Where they barely meet, the cube of what rounding leaves.
+                (None, Some((value, _))) => assert!(value < 1e-30, "{value} {a:?} {b:?}"),
+                (Some(_), None) => panic!("{a:?} {b:?}"),
+            }
+        }
+        assert!(met > 500 && missed > 2_000, "{met} {missed}");
+    }
 }
