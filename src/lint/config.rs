@@ -21,6 +21,9 @@ pub const NAME: &str = "flexura.toml";
 struct Config {
     #[serde(default)]
     lints: BTreeMap<Spanned<String>, Spanned<String>>,
+    /// Read by the command.
+    #[serde(default, rename = "build")]
+    _build: toml::Table,
 }
 
 /// The levels in a configuration's text; `file` is its index in the source map.
