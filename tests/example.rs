@@ -11,7 +11,7 @@ use flexura::equilibrium::{Layout, Model};
 use flexura::geometry::{Mesh, Probe, check_mesh};
 use flexura::kinematics::solve_motion;
 use flexura::pipeline::{
-    self, Artefact, BuildOutcome, Compiler, Iteration, Origin, Progress, Request, Show, build,
+    self, Artefact, BuildOutcome, Compiler, Iteration, Origin, Progress, Request, Show, Stages, build,
 };
 use std::cell::Cell;
 use std::fmt::Write;
