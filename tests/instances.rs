@@ -482,7 +482,7 @@ fn a_common_body_makes_way_for_the_flexures_of_each_instance() {
     .unwrap();
     let cut = whole.carving.cuts.iter().find(|c| (c.body, c.flexure) == (0, 0)).unwrap();
     assert!(cut.depth_mm > 0.5 && cut.made, "{cut:?}");
-    let solids = whole.build(&[0, 1]).unwrap();
+    let solids = whole.build(&[0, 1]).unwrap().0;
     assert_eq!(solids.len(), 1);
     assert!(check_mesh(&solids[0]).is_printable());
     let probe = Probe::new(&solids[0]);
@@ -635,7 +635,7 @@ fn a_bore_stays_open_in_a_merged_body() {
             placement: place(x),
             bodies: vec![0],
         });
-        join(&shares).unwrap().build(&[0]).unwrap()
+        join(&shares).unwrap().build(&[0]).unwrap().0
     };
     for x in [0.5, 12.0] {
         let solids = united(x);

@@ -2,6 +2,7 @@
 //! that bending pulls along printed lines and not layers apart, and its width stands upright, so that its thickness is
 //! drawn and not stacked. What lies otherwise is named.
 
+use super::check::check_mesh;
 use super::mesh::Mesh;
 use super::parts::FlexureSolid;
 use super::sweep::tangents;
@@ -19,6 +20,9 @@ const LEAN_STEP: f64 = 0.1;
 const CANDIDATES: usize = 48;
 /// Faces this near to the bed rest on it, mm: bosses stay 0.02 mm, bars 0.25 mm below a layer's face.
 const RESTS_MM: f64 = 0.3;
+/// Places that are tried for a part, and how far one is beside the other, mm.
+const PLACES: usize = 24;
+const ASIDE_MM: f64 = 1.0 / 512.0;
 /// Heights that differ by less are equal, mm.
 const EQUAL_MM: f64 = 0.1;
 
@@ -51,11 +55,21 @@ pub enum Posture {
 }
 
 impl Lying {
-    /// The part on the bed, with coordinates exact in `f32`.
+    /// The part on the bed, with coordinates exact in `f32`. Elsewhere they round otherwise, and slender triangles may then
+    /// cross: of the first few places beside each other, all nearer than a printer resolves, the first where the part is
+    /// sound is taken (the first of all where none is, or the part is not sound where it was made).
     pub fn mesh(&self, mesh: &Mesh) -> Mesh {
-        let place = |p: &Vector3<f64>| self.rotation * p + self.translation;
-        let vertices = mesh.vertices.iter().map(place).collect();
-        Mesh { vertices, triangles: mesh.triangles.clone() }.rounded_to_f32().sorted()
+        let placed = |k: usize| {
+            let shift = Vector3::new(1.0, 1.0, 0.25) * (k as f64 * ASIDE_MM);
+            let place = |p: &Vector3<f64>| self.rotation * p + self.translation + shift;
+            let vertices = mesh.vertices.iter().map(place).collect();
+            Mesh { vertices, triangles: mesh.triangles.clone() }.rounded_to_f32().sorted()
+        };
+        let first = placed(0);
+        if check_mesh(&first).is_sound() {
+            return first;
+        }
+        (1..PLACES).map(placed).find(|m| check_mesh(m).is_sound()).unwrap_or(first)
     }
 
     /// The flexures that leave the layers, with their angles (rad).
