@@ -1,6 +1,6 @@
 //! `flexura explain`.
 
-use super::commands::{FAILED, FINE, print};
+use super::commands::{FAILED, print};
 use super::render::tell;
 use super::{Format, style::Style};
 use clap::Args;
@@ -44,7 +44,6 @@ pub fn explain(arguments: &Explain) -> u8 {
             FAILED
         }
     }
-    .max(FINE)
 }
 
 /// A page for the terminal: headings bold, samples indented, fences left out.
