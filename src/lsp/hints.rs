@@ -15,11 +15,14 @@ pub fn hints(space: &Space, file: &str, known: &Evaluated) -> Vec<(usize, String
         let computed = matches!(symbol.what, What::Let | What::Param | What::Point);
         let written = text.text.get(symbol.whole.clone()).and_then(|t| t.split_once('=')).map_or("", |t| t.1);
         // What is written down needs no hint.
-        let plain = !written.contains(|c: char| "+*/^".contains(c))
-            && !written.contains(|c: char| c.is_alphabetic() && c.is_uppercase());
+        let sum = written.contains(['+', '*', '/', '^']);
+        let plain = !sum && literal(written);
         let free = written.trim_start().starts_with("free ");
-        if let (true, Some(value)) =
-            (computed && !free && !(plain && literal(written)), known.value(file, &symbol.at))
+        if let Some(value) = known.value(file, &symbol.at)
+            && computed
+            && !free
+            && !plain
+            && written.trim() != value
         {
             all.push((symbol.whole.end, format!("= {value}")));
         }

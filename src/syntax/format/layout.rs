@@ -9,8 +9,9 @@ const COMMENT_SPREAD: usize = 40;
 /// Spaces before a comment.
 const BEFORE_COMMENT: usize = 2;
 
-/// Prints lines, each ended by `end`.
-pub(super) fn print(mut lines: Vec<Line>, end: &str) -> String {
+/// Prints lines, each ended by `end`; the last one is not where it is left as it is and had no end (`open`): recovery
+/// reads `x {` at the end of a line otherwise than at the end of a file.
+pub(super) fn print(mut lines: Vec<Line>, end: &str, open: bool) -> String {
     for paragraph in paragraphs(&lines) {
         align(&mut lines, &paragraph);
     }
@@ -36,6 +37,9 @@ pub(super) fn print(mut lines: Vec<Line>, end: &str) -> String {
             out.push_str(&line.comment);
         }
         out.push_str(end);
+    }
+    if open && lines.last().is_some_and(|l| l.kind == LineKind::AsIs) {
+        out.truncate(out.len().saturating_sub(end.len()));
     }
     out
 }

@@ -37,7 +37,7 @@ pub fn format(file: u32, text: &str) -> Result<Formatted, Box<Diagnostic>> {
     let (lines, left) = lines::lines(&parse.tree, text);
     let end = if text.contains("\r\n") { "\r\n" } else { "\n" };
     let mark = if text.starts_with('\u{FEFF}') { "\u{FEFF}" } else { "" };
-    let new = format!("{mark}{}", layout::print(lines, end));
+    let new = format!("{mark}{}", layout::print(lines, end, !text.ends_with(['\n', '\r'])));
     match difference(&parse.tree, text, &super::parse(file, &new).tree, &new) {
         None => Ok(Formatted { text: new, left }),
         Some(at) => {
