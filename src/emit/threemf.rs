@@ -41,7 +41,7 @@ pub fn threemf_bytes(plate: &Plate, thumbnail: &[u8]) -> Result<Vec<u8>, String>
         let object = model
             .add_mesh_object(|o| {
                 o.object_type(ObjectType::Model).name(&part.name).part_number(&part.name);
-                o.pid(group).pindex((material as u32).into());
+                o.pid(group).pindex(material as u32);
                 for v in &part.mesh.vertices {
                     o.add_vertex(&[v.x, v.y, v.z].map(round));
                 }
