@@ -68,6 +68,7 @@ fn crank(closed: bool) -> Sketch {
         duration_s: 2.0,
         closed,
         rest_rad: 30_f64.to_radians(),
+        acceleration_rad_s2: None,
     }
 }
 

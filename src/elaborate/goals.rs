@@ -6,14 +6,15 @@ use super::eval::{Env, Evaluator, Failed, Outcome};
 use super::sheet::{DriveText, Sheet, TraceText};
 use super::structure::Structure;
 use crate::diagnostic::Diagnostic;
-use crate::ir::{Cycle, Export, ExportKind, Trace};
+use crate::ir::{CodeKind, Cycle, Export, ExportKind, Trace};
 use crate::syntax::ast::{Argument, Expr, ExprKind, Ident};
 use std::collections::BTreeMap;
 
 /// Most steps of a cycle.
 const MAX_STEPS: f64 = 100_000.0;
-const EXPORTS: &[&str] = &["stl", "glb", "arduino"];
-const LATER_EXPORTS: &[&str] = &["report", "dynamixel", "micropython", "csv", "step"];
+const EXPORTS: &[&str] =
+    &["stl", "glb", "arduino", "dynamixel", "micropython", "c", "csv", "json", "ros2"];
+const LATER_EXPORTS: &[&str] = &["report", "step"];
 
 impl<'a> Evaluator<'a> {
     pub(super) fn cycle(&mut self, scope: usize, sheet: &Sheet<'a>, steps: Option<usize>) -> Outcome<Cycle> {
@@ -121,6 +122,9 @@ impl<'a> Evaluator<'a> {
             "glb" => {
                 self.arguments(name, args, &[], 0)?;
                 Ok(Export { kind: ExportKind::Glb, origin: e.at })
+            }
+            code if CodeKind::named(code).is_some() && !(code == "arduino" && args.len() == 1) => {
+                self.code_export(scope, name, args, drives, texts, e.at)
             }
             "arduino" => {
                 let slots = self.arguments(name, args, &["drive"], 1)?;

@@ -44,6 +44,7 @@ mod terms;
 mod theory;
 pub mod units;
 mod value;
+mod workspaces;
 
 use crate::diagnostic::{Diagnostic, Edit, Fix, Origin, SourceMap};
 use crate::ir::{Assembly, Design};

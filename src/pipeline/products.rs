@@ -48,7 +48,7 @@ pub fn artefacts(built: &Built<'_>) -> (Vec<Artefact>, Vec<Diagnostic>) {
                 let bytes = glb_bytes(scene()).map_err(|e| e.to_string());
                 keep(format!("{name}.glb"), bytes, ("E0643", "glTF"));
             }
-            ExportKind::Arduino(_) => {}
+            ExportKind::Arduino(_) | ExportKind::Code(..) => {}
         }
     }
     (out, found)

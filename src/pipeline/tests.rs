@@ -41,6 +41,7 @@ pub(super) fn design() -> Design {
             rest: 0.0,
             free_rest: None,
             motor: Some(Motor {
+                motion: Default::default(),
                 name: "m".into(),
                 interface: MotorInterface::Stepper { steps_per_turn: 200, microsteps: 8 },
                 stall_n_mm: 400.0,
