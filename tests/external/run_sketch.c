@@ -1,6 +1,10 @@
-// run_sketch SKETCH.elf SECONDS OUT.vcd [AT TEXT]...: runs a sketch on a simulated Uno, writes what Timer1's pins (digital
-// 9 and 10) do to a VCD file, and sends each TEXT and a line feed to its serial port at AT seconds.
+// run_sketch SKETCH.elf SECONDS OUT.vcd [AT TEXT]...: runs a sketch on a simulated Uno, writes what Timer1 does to a VCD
+// file, and sends each TEXT and a line feed to its serial port at AT seconds. `oc1a` and `oc1b` are the pins (digital 9 and
+// 10). simavr 1.6 keeps the first width of a pulse for ever: it does not see that a compare register was written while
+// the timer counts to ICR1. So the registers themselves are in the trace too (`ocr1a`, `ocr1b`), at every write: on a
+// chip the next pulse is as wide as that.
 #include <simavr/avr_ioport.h>
+#include <simavr/avr_timer.h>
 #include <simavr/avr_uart.h>
 #include <simavr/sim_avr.h>
 #include <simavr/sim_elf.h>
@@ -25,6 +29,9 @@ int main(int argc, char **argv) {
     avr_vcd_init(avr, argv[3], &vcd, 1000);
     avr_vcd_add_signal(&vcd, avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('B'), 1), 1, "oc1a");
     avr_vcd_add_signal(&vcd, avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('B'), 2), 1, "oc1b");
+    avr_irq_t *timer = avr_io_getirq(avr, AVR_IOCTL_TIMER_GETIRQ('1'), 0);
+    avr_vcd_add_signal(&vcd, timer + TIMER_IRQ_OUT_PWM0, 16, "ocr1a");
+    avr_vcd_add_signal(&vcd, timer + TIMER_IRQ_OUT_PWM1, 16, "ocr1b");
     avr_vcd_start(&vcd);
     avr_irq_t *serial = avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT);
     const avr_cycle_count_t end = (avr_cycle_count_t)(atof(argv[2]) * 16e6);
