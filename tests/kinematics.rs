@@ -61,7 +61,15 @@ impl Builder {
         let id = self.0.bodies.len();
         let skeleton: Vec<NamedPoint> = Vec::new();
         let origin = origin(1, id);
-        self.0.bodies.push(Body { name: name.into(), ground, skeleton, layer, owner: None, printed: None, origin });
+        self.0.bodies.push(Body {
+            name: name.into(),
+            ground,
+            skeleton,
+            layer,
+            owner: None,
+            printed: None,
+            origin,
+        });
         id
     }
 

@@ -152,7 +152,11 @@ fn servo_pulses_are_the_design_s_angles() {
     let dir = tempfile::tempdir().unwrap();
     let elf = compile(dir.path(), &artefacts["nodder_motor/nodder_motor.ino"]);
     let (runner, trace) = (dir.path().join("run"), dir.path().join("trace.vcd"));
-    run(Command::new("cc").args(["-O2", "-o"]).arg(&runner).arg(scripts().join("run_sketch.c")).arg("-lsimavr"));
+    run(Command::new("cc")
+        .args(["-O2", "-o"])
+        .arg(&runner)
+        .arg(scripts().join("run_sketch.c"))
+        .arg("-lsimavr"));
     // Two seconds in the rest pose, a cycle and a half, then 10 deg.
     run(Command::new(&runner).arg(&elf).arg("6").arg(&trace).args(["5.0", "p 10"]));
     let signals = vcd(&std::fs::read_to_string(&trace).unwrap());
@@ -161,7 +165,11 @@ fn servo_pulses_are_the_design_s_angles() {
     // The pin itself: a pulse every 20 ms, of the rest pose's width, and this is the register's value.
     let pin = &signals["oc1a"];
     let rises: Vec<f64> = pin.iter().filter(|c| c.1 == 1).map(|c| c.0).collect();
-    assert!(rises.len() > 250 && rises.windows(2).all(|w| (w[1] - w[0] - 20_000.0).abs() < 1.0), "{}", rises.len());
+    assert!(
+        rises.len() > 250 && rises.windows(2).all(|w| (w[1] - w[0] - 20_000.0).abs() < 1.0),
+        "{}",
+        rises.len()
+    );
     let first = pin.iter().position(|c| c.1 == 1).unwrap();
     let width = pin[first + 1].0 - pin[first].0;
     assert!((width - pulse_us(0.0)).abs() < PULSE_US, "{width}");
@@ -281,7 +289,11 @@ fn c_and_micropython_say_what_the_table_says() {
     }
     let micropython = std::env::var("MICROPYTHON").unwrap_or_default();
     let module = format!("{micropython}/micropython.mjs");
-    if have(&["node"], &[&module], "node and npm's @micropython/micropython-webassembly-pyscript (MICROPYTHON)") {
+    if have(
+        &["node"],
+        &[&module],
+        "node and npm's @micropython/micropython-webassembly-pyscript (MICROPYTHON)",
+    ) {
         let program = dir.path().join("ask.txt");
         let text = format!(
             "import nodder as m\nfor t in ({list_us},):\n    print(m.position_mdeg(0, t))\nfor x in ({},):\n    \
@@ -333,9 +345,13 @@ fn limits_and_what_cannot_be_inverted_are_told_with_their_place() {
     let swing = |deg: f64, motor: &str| format!("drive motor by {deg} deg * sin(360 deg * t) with {motor}");
     let fast = nodder("sg90", &swing(30.0, "sg90"), "", "c").replace("over 2 s", "over 0.2 s");
     let d = code_of(&fast, "E0721");
-    assert!(d.message.starts_with("`motor` would have to turn at 9") && d.message.contains("600 deg/s"), "{d:?}");
+    assert!(
+        d.message.starts_with("`motor` would have to turn at 9") && d.message.contains("600 deg/s"),
+        "{d:?}"
+    );
     assert!(fast[d.labels[0].at.start as usize..].starts_with("drive motor"));
-    let beyond = nodder("sg90", "drive motor from -10 deg to 20 deg with sg90\n    rest motor at -170 deg", "", "c");
+    let beyond =
+        nodder("sg90", "drive motor from -10 deg to 20 deg with sg90\n    rest motor at -170 deg", "", "c");
     // The elaborated range is that of the motion alone; a servo must also reach its rest pose.
     let (_, found) = build(&beyond, None);
     assert!(found.iter().any(|d| d.code == "E0723" || d.is_error()), "{found:?}");
@@ -347,11 +363,17 @@ fn limits_and_what_cannot_be_inverted_are_told_with_their_place() {
     let d = code_of(&folded, "E0725");
     assert!(d.message.contains("turns back at motor ") && d.message.ends_with(" deg"), "{d:?}");
     assert!(folded[d.labels[0].at.start as usize..].starts_with("workspace nod"));
-    let moved = nodder("sg90", &swing(30.0, "sg90"), "load 0.1 N * t along (0, -1, 0) on coupler at B\n    workspace nod by motor from -20 deg to 20 deg", "c");
+    let moved = nodder(
+        "sg90",
+        &swing(30.0, "sg90"),
+        "load 0.1 N * t along (0, -1, 0) on coupler at B\n    workspace nod by motor from -20 deg to 20 deg",
+        "c",
+    );
     assert!(code_of(&moved, "E0726").message.contains("loads that do not change"));
     let steady = moved.replace("N * t", "N").replace("20 deg\n", "20 deg in 8 steps\n");
     assert!(built(&steady)["nodder_motion.h"].contains("nodder_aim_nod"));
-    let odd = nodder("sg90", &swing(30.0, "sg90"), "workspace nod, tip.x by motor from -20 deg to 20 deg", "c");
+    let odd =
+        nodder("sg90", &swing(30.0, "sg90"), "workspace nod, tip.x by motor from -20 deg to 20 deg", "c");
     assert_eq!(code_of(&odd, "E0452").labels[0].text, "2 and 1");
 }
 
@@ -382,8 +404,10 @@ fn aims_hit(text: &str, lock: String, table: usize) {
     let aim = &json["aims"][table];
     let list = |v: &Value| v.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect::<Vec<f64>>();
     let stated = aim["error"].as_f64().unwrap();
-    let outputs: Vec<Vec<f64>> = aim["outputs"].as_array().unwrap().iter().map(|o| list(&o["values"])).collect();
-    let shafts: Vec<Vec<f64>> = aim["drives"].as_array().unwrap().iter().map(|o| list(&o["shaft_deg"])).collect();
+    let outputs: Vec<Vec<f64>> =
+        aim["outputs"].as_array().unwrap().iter().map(|o| list(&o["values"])).collect();
+    let shafts: Vec<Vec<f64>> =
+        aim["drives"].as_array().unwrap().iter().map(|o| list(&o["shaft_deg"])).collect();
     let made = flexura::emit::motion::AimTable {
         name: String::new(),
         wanted: Vec::new(),
@@ -395,11 +419,14 @@ fn aims_hit(text: &str, lock: String, table: usize) {
         region: String::new(),
     };
     // Targets: any that are reached, within the least and largest outputs.
-    let ends = |o: &[f64]| (o.iter().copied().fold(f64::INFINITY, f64::min), o.iter().copied().fold(f64::NEG_INFINITY, f64::max));
+    let ends = |o: &[f64]| {
+        (o.iter().copied().fold(f64::INFINITY, f64::min), o.iter().copied().fold(f64::NEG_INFINITY, f64::max))
+    };
     let dice = random(7, 2000);
     let mut targets = Vec::new();
     for pair in dice.chunks(2) {
-        let target: Vec<f64> = outputs.iter().zip(pair).map(|(o, r)| ends(o).0 + r * (ends(o).1 - ends(o).0)).collect();
+        let target: Vec<f64> =
+            outputs.iter().zip(pair).map(|(o, r)| ends(o).0 + r * (ends(o).1 - ends(o).0)).collect();
         if let Some(shaft) = made.solve(&target).filter(|_| targets.len() < 100) {
             targets.push((target, shaft));
         }

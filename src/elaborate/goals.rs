@@ -12,8 +12,7 @@ use std::collections::BTreeMap;
 
 /// Most steps of a cycle.
 const MAX_STEPS: f64 = 100_000.0;
-const EXPORTS: &[&str] =
-    &["stl", "glb", "arduino", "dynamixel", "micropython", "c", "csv", "json", "ros2"];
+const EXPORTS: &[&str] = &["stl", "glb", "arduino", "dynamixel", "micropython", "c", "csv", "json", "ros2"];
 const LATER_EXPORTS: &[&str] = &["report", "step"];
 
 impl<'a> Evaluator<'a> {

@@ -8,7 +8,10 @@ use serde::Serialize;
 ///
 /// # Errors
 /// Where a template is faulty: never a fault of the design.
-pub fn render(templates: &[(&'static str, &'static str)], context: &impl Serialize) -> Result<String, String> {
+pub fn render(
+    templates: &[(&'static str, &'static str)],
+    context: &impl Serialize,
+) -> Result<String, String> {
     let faulty = |e: minijinja::Error| e.to_string();
     let mut environment = Environment::new();
     let syntax = SyntaxConfig::builder()

@@ -151,7 +151,9 @@ fn write(
             }
         }
         CodeKind::Dynamixel => {
-            if let Some(other) = motion.axes.iter().enumerate().find(|(i, _)| !bus.contains(i)).map(|(_, a)| a) {
+            if let Some(other) =
+                motion.axes.iter().enumerate().find(|(i, _)| !bus.contains(i)).map(|(_, a)| a)
+            {
                 let message = format!("the motor of `{}` is not on a Dynamixel bus", other.name);
                 let d = Diagnostic::error("E0724", message, at).also(other.origin, "driven here");
                 return tell(out, d.help("name the drives that are, or write `export arduino`"));

@@ -279,7 +279,9 @@ fn along(design: &Design, drives: &[Vec<f64>]) -> Design {
     let mut design = design.clone();
     let last = drives.len().saturating_sub(1).max(1);
     for (d, drive) in design.drives.iter_mut().enumerate() {
-        let key = |(k, place): (usize, &Vec<f64>)| (k as f64 / last as f64, place.get(d).copied().unwrap_or(f64::NAN));
+        let key = |(k, place): (usize, &Vec<f64>)| {
+            (k as f64 / last as f64, place.get(d).copied().unwrap_or(f64::NAN))
+        };
         let keys = drives.iter().enumerate().map(key).collect();
         drive.profile = Profile::Keys { smooth: false, keys, closed: false };
     }

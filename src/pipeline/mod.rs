@@ -30,9 +30,7 @@ pub use report::{
     Seconds, StressMeasures, TraceMeasures, Worst,
 };
 pub use stability::{DriveValues, LimitPoint, RestState, SnapThrough, Stability};
-pub use stages::{
-    Between, Checked, Failed, Made, NothingMade, Response, Simulation, Solved, Stages,
-};
+pub use stages::{Between, Checked, Failed, Made, NothingMade, Response, Simulation, Solved, Stages};
 
 use crate::diagnostic::{Diagnostic, Severity};
 pub use crate::elaborate::{FileError, Files};

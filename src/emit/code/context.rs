@@ -112,7 +112,8 @@ impl AxisContext {
         let [least_us, most_us] = pulses.unwrap_or(USUAL_PULSES_US).map(|us| us.round() as u32);
         let mdeg = |rad: f64| (rad.to_degrees() * MDEG).round() as i64;
         let range = axis.range_rad().unwrap_or(0.0);
-        let (low, high) = axis.values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+        let (low, high) =
+            axis.values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
         let cells: Vec<String> = axis.shaft_mdeg.iter().map(i32::to_string).collect();
         let is = |wanted: fn(&MotorInterface) -> bool| motor.is_some_and(|m| wanted(&m.interface));
         Self {
@@ -161,7 +162,9 @@ impl AimContext {
             cells.chunks(A_LINE).map(|c| format!("{},", c.join(", "))).collect()
         };
         let unit = table.wanted.first().map_or("", |w| w.1.shown());
-        let ends = |o: &Vec<f32>| o.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+        let ends = |o: &Vec<f32>| {
+            o.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)))
+        };
         let ends: Vec<(f32, f32)> = table.outputs.iter().map(ends).collect();
         let shown = |which: fn(&(f32, f32)) -> f32| {
             ends.iter().map(|e| format!("{:.2}", which(e))).collect::<Vec<_>>().join(", ")
@@ -181,7 +184,11 @@ impl AimContext {
             points: table.outputs.first().map_or(0, Vec::len),
             rows: table.shaft_mdeg.first().map_or(0, Vec::len),
             columns: table.shaft_mdeg.get(1).map_or(1, Vec::len),
-            outputs: table.outputs.iter().map(|o| lines(o.iter().map(|v| format!("{v:?}")).collect())).collect(),
+            outputs: table
+                .outputs
+                .iter()
+                .map(|o| lines(o.iter().map(|v| format!("{v:?}")).collect()))
+                .collect(),
             shafts: table.shaft_mdeg.iter().map(|s| lines(s.iter().map(i32::to_string).collect())).collect(),
         }
     }

@@ -105,7 +105,9 @@ impl fmt::Display for AimError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Flat => write!(f, "it does not change with these drives"),
-            Self::Folds { region } => write!(f, "it has one value at several places: it turns back at {region}"),
+            Self::Folds { region } => {
+                write!(f, "it has one value at several places: it turns back at {region}")
+            }
         }
     }
 }
@@ -210,7 +212,8 @@ fn longest_run(outputs: &[f64], least: f64) -> (usize, usize) {
 fn one(grid: &Grid, axis: &GridAxis) -> Result<AimTable, AimError> {
     let outputs = grid.outputs.first().ok_or(AimError::Flat)?;
     let refine = grid.refine.max(1);
-    let (low, high) = outputs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let (low, high) =
+        outputs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     let span = high - low;
     if outputs.len() < refine + 1 || span.is_nan() || span < 1e-9 {
         return Err(AimError::Flat);
@@ -282,14 +285,13 @@ fn two(grid: &Grid, a: &GridAxis, b: &GridAxis) -> Result<AimTable, AimError> {
     };
     let cells = || (0..is.len() - 1).flat_map(|i| (0..js.len() - 1).map(move |j| (i, j)));
     let triangles: Vec<((usize, usize), [[f64; 2]; 3])> = cells()
-        .flat_map(|(i, j)| {
-            [false, true].map(|upper| ((i, j), corners(i, j, upper).map(|(k, l)| node(k, l))))
-        })
+        .flat_map(|(i, j)| [false, true].map(|upper| ((i, j), corners(i, j, upper).map(|(k, l)| node(k, l)))))
         .collect();
     let area = |t: &[[f64; 2]; 3]| {
         (t[1][0] - t[0][0]) * (t[2][1] - t[0][1]) - (t[1][1] - t[0][1]) * (t[2][0] - t[0][0])
     };
-    let largest = triangles.iter().map(|(_, t)| area(t)).fold(0.0, |m: f64, x| if x.abs() > m.abs() { x } else { m });
+    let largest =
+        triangles.iter().map(|(_, t)| area(t)).fold(0.0, |m: f64, x| if x.abs() > m.abs() { x } else { m });
     if largest == 0.0 || !largest.is_finite() {
         return Err(AimError::Flat);
     }

@@ -116,7 +116,11 @@ impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Samples { steps } => {
-                write!(f, "a cycle of {steps} steps does not fit a table, which takes {}", super::MOST_SAMPLES)
+                write!(
+                    f,
+                    "a cycle of {steps} steps does not fit a table, which takes {}",
+                    super::MOST_SAMPLES
+                )
             }
             Self::Position { axis, .. } => write!(f, "`{axis}` goes where no table follows"),
             Self::Beyond { limit, axis, motor, asked, can, state, .. } => match limit {
@@ -203,7 +207,13 @@ impl Motion {
         }
         if let Some(can) = motor.motion.acceleration_rad_s2 {
             let least = self.duration_s * (peaks.acceleration_rad_s2 / can).sqrt();
-            beyond(Limit::Acceleration, peaks.acceleration_rad_s2, can, peaks.acceleration_state, Some(least));
+            beyond(
+                Limit::Acceleration,
+                peaks.acceleration_rad_s2,
+                can,
+                peaks.acceleration_state,
+                Some(least),
+            );
         }
         if let (Some(range), false) = (axis.range_rad(), axis.continuous) {
             let (low, high) = axis.span_rad();

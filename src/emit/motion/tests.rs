@@ -36,15 +36,21 @@ fn servo(speed_deg_s: f64) -> Motor {
 /// 0, 35°, −35°, 0.
 fn swing() -> Profile {
     let keys = [(0.0, 0.0), (0.25, 35.0), (0.75, -35.0), (1.0, 0.0)];
-    Profile::Keys { smooth: false, keys: keys.map(|(t, v): (f64, f64)| (t, v.to_radians())).to_vec(), closed: true }
+    Profile::Keys {
+        smooth: false,
+        keys: keys.map(|(t, v): (f64, f64)| (t, v.to_radians())).to_vec(),
+        closed: true,
+    }
 }
 
 #[test]
 fn a_servo_that_is_asked_for_too_much_says_how_much() {
-    let of = |speed: f64| Motion::sample("m", &[raw(swing(), Some(servo(speed)))], 60, 1.0).unwrap().refusals();
+    let of =
+        |speed: f64| Motion::sample("m", &[raw(swing(), Some(servo(speed)))], 60, 1.0).unwrap().refusals();
     assert_eq!(of(141.0), []);
     // 35 deg in a quarter of a second.
-    let [Refusal::Beyond { limit: Limit::Speed, asked, least_duration_s: Some(least), .. }] = &of(100.0)[..] else {
+    let [Refusal::Beyond { limit: Limit::Speed, asked, least_duration_s: Some(least), .. }] = &of(100.0)[..]
+    else {
         panic!("140 deg/s is too fast")
     };
     assert!((asked - 140.0).abs() < 1e-9 && (least - 1.4).abs() < 1e-9, "{asked} {least}");
@@ -98,7 +104,8 @@ fn a_drum_turns_by_length_over_radius() {
     let mut r = raw(Profile::Range { from: 0.0, to: 5.0 }, Some(servo(1e6)));
     (r.axis.unit, r.axis.drum_radius_mm, r.axis.rest) = (DriveUnit::Mm, Some(4.0), 1.0);
     let motion = Motion::sample("m", &[r], 4, 1.0).unwrap();
-    let want: Vec<i32> = [-1.0, 0.25, 1.5, 2.75, 4.0_f64].map(|mm| ((mm / 4.0).to_degrees() * 1e3).round() as i32).into();
+    let want: Vec<i32> =
+        [-1.0, 0.25, 1.5, 2.75, 4.0_f64].map(|mm| ((mm / 4.0).to_degrees() * 1e3).round() as i32).into();
     assert_eq!(motion.axes[0].shaft_mdeg, want);
     assert!(!motion.closed);
 }
@@ -127,7 +134,9 @@ fn grid(n: usize, refine: usize, f: impl Fn(f64, f64) -> [f64; 2]) -> Grid {
         unit: "deg",
         resolution_deg: 0.1,
     };
-    let at = |o: usize| places.iter().flat_map(|a| places.iter().map(|b| f(*a, *b)[o]).collect::<Vec<_>>()).collect();
+    let at = |o: usize| {
+        places.iter().flat_map(|a| places.iter().map(|b| f(*a, *b)[o]).collect::<Vec<_>>()).collect()
+    };
     Grid {
         name: "g".into(),
         wanted: vec![("x".into(), OutputUnit::Mm), ("y".into(), OutputUnit::Mm)],
@@ -172,7 +181,9 @@ proptest! {
 
 #[test]
 fn what_cannot_be_inverted_is_named() {
-    let AimError::Folds { region } = AimTable::new(&grid(8, 2, |a, b| [a * a, b])).unwrap_err() else { panic!() };
+    let AimError::Folds { region } = AimTable::new(&grid(8, 2, |a, b| [a * a, b])).unwrap_err() else {
+        panic!()
+    };
     assert_eq!(region, "a -0.25 to 0.00 deg, b -1.00 to -0.75 deg");
     // Turned once round and over itself, never back.
     let round = |a: f64, b: f64| [(3.0 + b) * (4.0 * a).cos(), (3.0 + b) * (4.0 * a).sin()];
