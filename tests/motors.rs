@@ -220,7 +220,7 @@ fn sketches_of_all_motors_compile() {
 
 /// What C and MicroPython are asked: positions all over the cycle and beyond, and aims.
 fn questions() -> (Vec<u32>, Vec<f64>) {
-    ((0..=500).map(|k| k * 8_137).collect(), (0..60).map(|k| -12.0 + 0.41 * f64::from(k)).collect())
+    ((0..=500).map(|k| k * 8_137).collect(), (0..60).map(|k| -20.0 + 0.6 * f64::from(k)).collect())
 }
 
 /// Answers by the JSON artefact: shaft angle at each time, mdeg, and what each aim gives, -1 out of reach.

@@ -295,7 +295,8 @@ fn two(grid: &Grid, a: &GridAxis, b: &GridAxis) -> Result<AimTable, AimError> {
     if largest == 0.0 || !largest.is_finite() {
         return Err(AimError::Flat);
     }
-    let sense: f64 = triangles.iter().map(|(_, t)| area(t)).sum::<f64>().signum();
+    // The first cell that is turned otherwise than the first one lies at the fold.
+    let sense = triangles.first().map_or(1.0, |(_, t)| area(t).signum());
     if let Some(((i, j), _)) = triangles.iter().find(|(_, t)| area(t) * sense <= largest.abs() * FLAT) {
         return Err(AimError::Folds { region: region(*i, *j) });
     }
