@@ -68,6 +68,7 @@ fn crank(closed: bool) -> Sketch {
         duration_s: 2.0,
         closed,
         rest_rad: 30_f64.to_radians(),
+        acceleration_rad_s2: None,
     }
 }
 
@@ -86,6 +87,15 @@ fn ten_turns_are_exact_in_count_and_time() {
     assert!(pulses.iter().all(|(_, sign)| *sign == 1), "the crank never turns back");
     // Within a turn every pulse is where the table's straight lines put it: 53 or 54 pulses in 33.3 ms.
     let gaps: Vec<f64> = pulses.windows(2).map(|w| w[1].0 - w[0].0).collect();
+    // It starts from rest: 4 turns/s² from the first pulse on, and is at speed after an eighth of a second.
+    let (start, gaps) = gaps.split_at(200);
+    assert!(
+        start[0] > 4000.0 && start[20] > 1200.0 && start[20] < start[0] && start[60] < start[20],
+        "{start:?}"
+    );
+    let began = pulses[0].0 - (2.0 * 625.0 * 126_563.0_f64).sqrt();
+    let at_speed = pulses.iter().position(|p| p.0 - began > 126_563.0).unwrap();
+    assert!((95..=107).contains(&at_speed), "half as far as at full speed: {at_speed}");
     let widest = gaps.iter().copied().fold(0.0, f64::max);
     let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
     assert!(widest < 2e6 / 3200.0 * 1.02 + JITTER_US, "widest gap {widest} us");

@@ -31,7 +31,7 @@ fn run(body: &str, set: &[(&str, &str)]) -> Elaborated {
     let text = format!("{ARM}mechanism whole {{\n{body}}}\n");
     let set = set.iter().map(|(a, b)| (a.to_string(), b.to_string())).collect();
     let files = BTreeMap::from([("main.mech".to_string(), text)]);
-    elaborate("main.mech", &files, &Options { set, steps: None })
+    elaborate("main.mech", &files, &Options { set, steps: None, variant: None })
 }
 
 /// Where the tip is drawn, mm.

@@ -41,7 +41,7 @@ fn each_dependency_is_seen_by_one_folder() {
         ("argmin", "optimize/"),
         ("argmin_math", "optimize/"),
         ("boolmesh", "geometry/"),
-        ("minijinja", "emit/arduino/"),
+        ("minijinja", "emit/template.rs"),
         ("askama", "doc/"),
         ("stl_io", "emit/"),
         ("toml", "lint/"),

@@ -2,7 +2,6 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use flexura::elaborate::{Options, elaborate};
-use flexura::emit::arduino::Sketch;
 use flexura::equilibrium::{Layout, Model, sweep};
 use flexura::ir::{Design, Objective, ObjectiveKind};
 use flexura::kinematics::solve_motion;
@@ -175,8 +174,8 @@ fn a_slack_string_is_told() {
 #[test]
 fn a_drum_turns_way_into_angle() {
     let design = design(&finger(), 50);
-    let sketch = Sketch::of(&design, 0, &design.free.iter().map(|f| f.start).collect::<Vec<_>>()).unwrap();
-    let (first, last) = (sketch.angles_rad[0], sketch.angles_rad[50]);
+    let drive = &design.drives[0];
+    let [first, last] = [0.0, 1.0].map(|t| drive.motor_angle_rad(t, drive.rest).unwrap());
     assert!(first.abs() < 1e-15 && (last - 0.75).abs() < 1e-12, "{first} {last}");
     // 400 N mm at a radius of 4 mm.
     assert!((design.drives[0].stall_force_n().unwrap() - 100.0).abs() < 1e-12);

@@ -78,6 +78,7 @@ codes! {
     DRUM "E0444" "a motor on something that slides without a drum, or a drum without need";
     TARGET "E0450" "a target that is no path";
     EMPHASIS "E0451" "an emphasis that is negative, or zero all over the cycle";
+    WORKSPACE "E0452" "a workspace whose outputs or drives do not fit";
     CYCLES_DIFFER "E0460" "instances whose cycles differ";
     SHARED "E0461" "a body that a mirrored instance cannot share";
     MIXED "E0462" "one body of two materials or processes";

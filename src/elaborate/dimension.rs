@@ -23,6 +23,10 @@ impl Dimension {
     pub const TIME: Self = Self([0, 0, 1, 0]);
     /// Angle, rad.
     pub const ANGLE: Self = Self([0, 0, 0, 1]);
+    /// Angular speed, rad/s.
+    pub const SPEED: Self = Self([0, 0, -1, 1]);
+    /// Angular acceleration, rad/s².
+    pub const ACCELERATION: Self = Self([0, 0, -2, 1]);
     /// Force, N.
     pub const FORCE: Self = Self([1, 1, -2, 0]);
     /// Torque, N·mm.

@@ -6,14 +6,28 @@ use super::eval::{Env, Evaluator, Failed, Outcome};
 use super::sheet::{DriveText, Sheet, TraceText};
 use super::structure::Structure;
 use crate::diagnostic::Diagnostic;
-use crate::ir::{Cycle, Export, ExportKind, Trace};
+use crate::ir::{CodeKind, Cycle, Export, ExportKind, Trace};
 use crate::syntax::ast::{Argument, Expr, ExprKind, Ident};
 use std::collections::BTreeMap;
 
 /// Most steps of a cycle.
 const MAX_STEPS: f64 = 100_000.0;
-const EXPORTS: &[&str] = &["stl", "3mf", "sheet", "glb", "svg", "png", "arduino"];
-const LATER_EXPORTS: &[&str] = &["report", "dynamixel", "micropython", "csv", "step"];
+const EXPORTS: &[&str] = &[
+    "stl",
+    "3mf",
+    "sheet",
+    "glb",
+    "svg",
+    "png",
+    "arduino",
+    "dynamixel",
+    "micropython",
+    "c",
+    "csv",
+    "json",
+    "ros2",
+];
+const LATER_EXPORTS: &[&str] = &["report", "step"];
 
 impl<'a> Evaluator<'a> {
     pub(super) fn cycle(&mut self, scope: usize, sheet: &Sheet<'a>, steps: Option<usize>) -> Outcome<Cycle> {
@@ -128,6 +142,9 @@ impl<'a> Evaluator<'a> {
                     _ => ExportKind::Png,
                 };
                 Ok(Export { kind, origin: e.at })
+            }
+            code if CodeKind::named(code).is_some() && !(code == "arduino" && args.len() == 1) => {
+                self.code_export(scope, name, args, drives, texts, e.at)
             }
             "arduino" => {
                 let slots = self.arguments(name, args, &["drive"], 1)?;

@@ -169,6 +169,7 @@ impl<'a> Evaluator<'a> {
                 StatementKind::Load(_) => "load",
                 StatementKind::Output { .. } => "output",
                 StatementKind::Target { .. } => "target",
+                StatementKind::Workspace(_) => "workspace",
                 StatementKind::Model(_) => "links model",
                 _ => continue,
             };

@@ -78,6 +78,7 @@ impl<'a> Evaluator<'a> {
         }
         self.aims(scope, &sheet, &s, &trace_index, cycle.as_ref().map(|c| c.steps), outside);
         let driven = drive_names(&drives, &sheet);
+        self.workspaces(scope, &sheet, &driven, drives.as_deref());
         let named = Named { traces: &trace_index, driven: &driven, drives: drives.as_deref() };
         // Goals do not grow with the drawing.
         self.as_is = true;

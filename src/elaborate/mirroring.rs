@@ -252,6 +252,11 @@ impl<'a> Evaluator<'a> {
         other.name = text.name.node.clone();
         let Design { drives, exprs, .. } = &mut other;
         drives.iter_mut().zip(images).filter(|(_, i)| i.factor < 0.0).for_each(|(d, _)| d.reverse(exprs));
+        for stretch in other.aims.workspaces.iter_mut().flat_map(|w| &mut w.stretches) {
+            if images.get(stretch.drive).is_some_and(|i| i.factor < 0.0) {
+                (stretch.from, stretch.to) = (-stretch.to, -stretch.from);
+            }
+        }
         parts.designs.push(other);
         parts.items.extend(parts.items.get(source.design).copied());
         let index = parts.designs.len() - 1;

@@ -49,6 +49,7 @@ mod theory;
 pub mod units;
 mod value;
 mod variants;
+mod workspaces;
 
 use crate::diagnostic::{Diagnostic, Edit, Fix, Origin, SourceMap};
 use crate::ir::{Assembly, Design};

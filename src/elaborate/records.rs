@@ -8,8 +8,11 @@ use super::scope::{Key, State};
 use super::units::GRAMS_PER_TONNE;
 use super::value::{ItemRef, Value};
 use crate::diagnostic::{Diagnostic, Origin};
-use crate::ir::{Machine, Material, Motor, MotorInterface, Process};
+use crate::ir::{Machine, Material, Motor, MotorInterface, MotorMotion, Process};
 use crate::syntax::ast::{Ident, Item, Record};
+
+/// Servo pulses are shorter than a frame of 20 ms by far.
+const LONGEST_PULSE_S: f64 = 10e-3;
 
 /// What a field holds.
 #[derive(Clone, Copy, PartialEq)]
@@ -57,6 +60,11 @@ const MOTOR: &[Field] = &[
     field("microsteps", Dimension::NUMBER, false),
     field("range", Dimension::ANGLE, false),
     field("shaft", Dimension::LENGTH, false),
+    field("speed", Dimension::SPEED, false),
+    field("acceleration", Dimension::ACCELERATION, false),
+    field("resolution", Dimension::ANGLE, false),
+    field("least_pulse", Dimension::TIME, false),
+    field("most_pulse", Dimension::TIME, false),
 ];
 
 fn fields_of(kind: &str) -> Option<&'static [Field]> {
@@ -329,6 +337,29 @@ impl<'a> Evaluator<'a> {
             interface,
             stall_n_mm: self.positive_field(item, "stall")?.unwrap_or_default(),
             shaft_diameter_mm: self.positive_field(item, "shaft")?,
+            motion: self.motor_motion(item)?,
+        })
+    }
+
+    fn motor_motion(&mut self, item: ItemRef) -> Outcome<MotorMotion> {
+        let pulses = [self.positive_field(item, "least_pulse")?, self.positive_field(item, "most_pulse")?];
+        let pulses_s = match pulses {
+            [Some(least), Some(most)] if least < most && most < LONGEST_PULSE_S => Some([least, most]),
+            [None, None] => None,
+            _ => {
+                let at = self.record(item).map(|r| r.name.at).unwrap_or_default();
+                let message = "`least_pulse` and `most_pulse` are the widths at both ends of the range";
+                return self.fail(
+                    Diagnostic::error(codes::RECORD, message, at)
+                        .help("state both, the lesser first, or none: such as 0.5 ms and 2.4 ms"),
+                );
+            }
+        };
+        Ok(MotorMotion {
+            speed_rad_s: self.positive_field(item, "speed")?,
+            acceleration_rad_s2: self.positive_field(item, "acceleration")?,
+            resolution_rad: self.positive_field(item, "resolution")?,
+            pulses_s,
         })
     }
 

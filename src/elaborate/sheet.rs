@@ -59,6 +59,7 @@ pub struct Sheet<'a> {
     /// Traced directions.
     pub directions: Vec<TraceText<'a>>,
     pub outputs: Vec<(&'a Ident, &'a Expr, Origin)>,
+    pub workspaces: Vec<(&'a ast::Workspace, Origin)>,
     pub targets: Vec<(&'a Ident, &'a Expr, Origin)>,
     pub minimize: Option<(&'a [ast::Term], Origin)>,
     pub requires: Vec<RequireText<'a>>,
@@ -187,6 +188,7 @@ impl<'a> Evaluator<'a> {
                     sheet.outputs.push((name, value, at));
                 }
             }
+            StatementKind::Workspace(w) => sheet.workspaces.push((w, at)),
             StatementKind::Target { trace, value } => sheet.targets.push((trace, value, at)),
             StatementKind::Trace { name, point, body, .. } => {
                 if self.name_thing(scope, name, "trace") {

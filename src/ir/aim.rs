@@ -16,6 +16,9 @@ pub struct Aims {
     /// Angles that are asked for, by an `output` or in a requirement.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub angles: Vec<BodyAngle>,
+    /// Where outputs are to be aimed at by motors.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub workspaces: Vec<super::Workspace>,
 }
 
 impl Aims {

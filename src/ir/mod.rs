@@ -3,6 +3,7 @@
 
 mod aim;
 pub mod assembly;
+mod code;
 mod drive;
 pub mod expr;
 mod load;
@@ -12,6 +13,7 @@ mod solution;
 pub use crate::diagnostic::Origin;
 pub use aim::{Aims, BodyAngle, Direction, Target, TargetOf, TargetPath};
 pub use assembly::{Assembly, Instance, Placement};
+pub use code::{CodeKind, MotorMotion, Stretch, Wanted, Workspace};
 pub use drive::{Cable, Drive, DriveOn, DriveUnit, Profile};
 use expr::{ExprGraph, ExprId};
 pub use load::{Load, LoadKind};
@@ -603,6 +605,9 @@ pub struct Motor {
     pub stall_n_mm: f64,
     /// Shaft diameter, mm.
     pub shaft_diameter_mm: Option<f64>,
+    /// How it moves and is commanded: of no influence on the design.
+    #[serde(default, skip_serializing_if = "MotorMotion::is_empty")]
+    pub motion: MotorMotion,
 }
 
 /// How a motor is commanded.
@@ -657,11 +662,13 @@ pub enum ExportKind {
     Svg,
     /// Arduino sketch for one drive. Index into [`Design::drives`].
     Arduino(usize),
+    /// Code or keyframes for these drives, all where none is named. Indices into [`Design::drives`].
+    Code(CodeKind, Vec<usize>),
 }
 
 impl ExportKind {
     /// Whether it shows the printed parts.
     pub fn of_solids(&self) -> bool {
-        !matches!(self, Self::Arduino(_))
+        !matches!(self, Self::Arduino(_) | Self::Code(..))
     }
 }

@@ -79,6 +79,13 @@ pub fn expressions<'a>(s: &'a Statement, f: &mut dyn FnMut(&'a Expr)) {
         }
         K::Assert(a) => [&a.left, &a.right].into_iter().for_each(f),
         K::Variant(v) => v.settings.iter().for_each(|(_, e)| f(e)),
+        K::Workspace(w) => {
+            w.wanted.iter().for_each(&mut *f);
+            w.stretches.iter().for_each(|s| {
+                [&s.from, &s.to].into_iter().for_each(&mut *f);
+                s.steps.iter().for_each(&mut *f);
+            });
+        }
         K::For(l) => {
             [&l.first, &l.last].into_iter().for_each(&mut *f);
             l.statements.iter().for_each(|s| expressions(s, f));
@@ -143,6 +150,7 @@ pub fn references<'a>(s: &'a Statement, f: &mut dyn FnMut(&'a Ident)) {
             m.sharing.iter().for_each(&mut *f);
         }
         K::Variant(v) => v.settings.iter().for_each(|(name, _)| f(name)),
+        K::Workspace(w) => w.stretches.iter().for_each(|s| f(&s.drive)),
         K::For(l) => return l.statements.iter().for_each(|s| references(s, f)),
         _ => {}
     }

@@ -7,7 +7,6 @@ use super::stability::{DriveValues, Stability};
 use super::stages::{Between, Simulation};
 use crate::diagnostic::Diagnostic;
 use crate::emit::csv::{MotionState, MotionTable};
-use crate::ir::assembly::AssemblyExport;
 use crate::ir::{Assembly, Design, Instance, Placement};
 use crate::math::exp_so3;
 use nalgebra::Vector3;
@@ -299,19 +298,4 @@ pub fn check_all(
         out.push(check_requirement(&r.requirement, closed, of, found));
     }
     out
-}
-
-/// The design whose drive an export is for, named after assembly and instance, in the motor's own sense.
-pub fn driven(assembly: &Assembly, export: &AssemblyExport, drive: usize) -> Option<(Design, usize)> {
-    let instance = assembly.instances.get(export.instance?)?;
-    let mut design = assembly.designs.get(instance.design)?.clone();
-    if assembly.single().is_none() {
-        // `finger[2]` is no name for a file.
-        design.name = format!("{}_{}", assembly.name, instance.name.replace('[', "-").replace(']', ""));
-        if instance.drives.get(drive)?.sign < 0.0 {
-            let turned = design.drives.get_mut(drive)?;
-            turned.reverse(&mut design.exprs);
-        }
-    }
-    Some((design, drive))
 }

@@ -10,16 +10,16 @@ use super::report::{Artefact, Place, Worst};
 use super::scene::Moving;
 use super::solids;
 use super::stability;
-use super::stages::{Between, Checked, Failed, Simulation, Solved, Stages};
+use super::stages::{Between, Checked, Failed, Response, Simulation, Solved, Stages};
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
 use crate::equilibrium::{
-    Cycle, Equilibrium, Layout, Model, ModelError, PointForce, Solver, SweepError, sweep,
+    Cycle, Equilibrium, Layout, LayoutTrace, Model, ModelError, PointForce, Solver, SweepError, sweep,
 };
 use crate::geometry::{follows_geometry, parts_input};
 use crate::ir::expr::Node;
-use crate::ir::{Assembly, Design, DriveOn, ObjectiveKind, Solution};
+use crate::ir::{Assembly, Design, DriveOn, ObjectiveKind, Profile, Solution};
 use crate::kinematics::{Constraint, Motion, solve_motion};
 use crate::math::{Pose, log_so3};
 use crate::optimize::{self, Ending, Method, Problem};
@@ -129,6 +129,23 @@ impl Stages for Compiler {
         let problem = Problem::new(design, &layout, EDGES);
         let Some(trial) = problem.simulate(&problem.to_unit(values)) else { return Vec::new() };
         problem.term_names().into_iter().zip(trial.terms).collect()
+    }
+
+    fn respond(&self, design: &Design, values: &[f64], drives: &[Vec<f64>]) -> Result<Response, Failed> {
+        let design = &along(design, drives);
+        let design = &*gravity::weighed(design, values);
+        let (layout, motion) = layout(design, values)?;
+        let model = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
+        let cycle = sweep(&model).map_err(|e| lost(design, &e))?;
+        let aims = AimSeries::compliant(design, &layout, &motion, &cycle);
+        let place = |t: &LayoutTrace| {
+            cycle.states.iter().map(|e| e.state.poses[t.body].point(&t.rest).into()).collect()
+        };
+        Ok(Response {
+            angles_rad: aims.angles_rad,
+            traces_mm: layout.traces.iter().map(place).collect(),
+            directions: aims.directions,
+        })
     }
 
     fn between(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Between {
@@ -338,6 +355,24 @@ fn gives_way(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> 
 
 /// Ways shorter than this have no direction, mm.
 const NO_WAY_MM: f64 = 1e-9;
+
+/// The design with a cycle that takes its drives through given places, and no goals. Its loads must be constant.
+fn along(design: &Design, drives: &[Vec<f64>]) -> Design {
+    let mut design = design.clone();
+    let last = drives.len().saturating_sub(1).max(1);
+    for (d, drive) in design.drives.iter_mut().enumerate() {
+        let key = |(k, place): (usize, &Vec<f64>)| {
+            (k as f64 / last as f64, place.get(d).copied().unwrap_or(f64::NAN))
+        };
+        let keys = drives.iter().enumerate().map(key).collect();
+        drive.profile = Profile::Keys { smooth: false, keys, closed: false };
+    }
+    design.cycle.steps = last;
+    design.aims.targets.clear();
+    design.objectives.clear();
+    design.requirements.clear();
+    design
+}
 
 /// Conventional motion and layout.
 pub(super) fn layout(design: &Design, values: &[f64]) -> Result<(Layout, Motion), Failed> {

@@ -3,6 +3,7 @@
 
 mod aims;
 mod assembly;
+mod code;
 mod compiler;
 mod examine;
 mod gravity;
@@ -13,6 +14,7 @@ mod manifest;
 mod measure;
 mod products;
 mod progress;
+mod reach;
 mod report;
 mod scene;
 mod solids;
@@ -30,13 +32,12 @@ pub use report::{
     Seconds, StressMeasures, TraceMeasures, Worst,
 };
 pub use stability::{DriveValues, LimitPoint, RestState, SnapThrough, Stability};
-pub use stages::{Between, Checked, Failed, Made, NothingMade, Simulation, Solved, Stages};
+pub use stages::{Between, Checked, Failed, Made, NothingMade, Response, Simulation, Solved, Stages};
 
 use crate::diagnostic::{Diagnostic, Severity};
 pub use crate::elaborate::{FileError, Files};
-use crate::emit::arduino::Sketch;
 use crate::emit::lock::{Lock, LockState};
-use crate::ir::{Assembly, Design, ExportKind, Solution};
+use crate::ir::{Assembly, Design, Solution};
 use crate::lint::{Levels, Stage as Reached};
 use std::sync::atomic::AtomicBool;
 
@@ -176,7 +177,7 @@ fn run_build(
     }
     clock.stop(&mut out.seconds.mesh);
     let clock = Clock::start(progress, Stage::Emit);
-    emit_sketches(&assembly, &values, out);
+    code::emit(&assembly, &values, stages, out);
     out.reached = Reached::Parts;
     let manifest = manifest::write(out, told, &fingerprint);
     out.manifest = manifest.map(|bytes| Artefact { name: manifest::name(&request.source), bytes });
@@ -457,26 +458,6 @@ fn frozen(design: &Design, request: &Request) -> Diagnostic {
         None => "there is no lock, and `--frozen` forbids solving",
     };
     Diagnostic::error("E0710", message, design.origin).help("build without `--frozen` and keep the new lock")
-}
-
-fn emit_sketches(assembly: &Assembly, values: &[Vec<f64>], out: &mut BuildOutcome) {
-    for placed in &assembly.exports {
-        let export = &placed.export;
-        let ExportKind::Arduino(drive) = export.kind else { continue };
-        let Some((design, drive)) = assembly::driven(assembly, placed, drive) else { continue };
-        let own = placed.instance.and_then(|i| values.get(assembly.instances.get(i)?.design));
-        match Sketch::of(&design, drive, own.map_or(&[], Vec::as_slice))
-            .and_then(|s| Ok((s.name(), s.render()?)))
-        {
-            Ok((name, text)) => {
-                out.artefacts.push(Artefact { name: format!("{name}/{name}.ino"), bytes: text.into_bytes() })
-            }
-            Err(e) => {
-                let message = format!("no sketch can be written: {e}");
-                out.diagnostics.push(Diagnostic::error("E0720", message, export.origin));
-            }
-        }
-    }
 }
 
 fn starts(design: &Design) -> Vec<f64> {

@@ -111,6 +111,6 @@ fn files<'s>(
             let bytes = Ok(svg_drawing(scene()).into_bytes());
             vec![file(format!("{name}.svg"), bytes, "E0647", "drawing")]
         }
-        ExportKind::Arduino(_) => Vec::new(),
+        ExportKind::Arduino(_) | ExportKind::Code(..) => Vec::new(),
     }
 }

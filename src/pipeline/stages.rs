@@ -76,6 +76,17 @@ pub struct Solved {
     pub diagnostics: Vec<Diagnostic>,
 }
 
+/// Where the compliant mechanism is at given drive values: a value a place in every list.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Response {
+    /// Each angle of the design, unwrapped, rad.
+    pub angles_rad: Vec<Vec<f64>>,
+    /// Each traced point, mm.
+    pub traces_mm: Vec<Vec<[f64; 3]>>,
+    /// Each traced direction.
+    pub directions: Vec<Vec<[f64; 3]>>,
+}
+
 /// What already stands in the output folder.
 pub trait Made {
     /// The bytes of a file by its name relative to the folder, with `/`; none where there is none, or it is not to be
@@ -134,6 +145,15 @@ pub trait Stages {
     /// The terms of the objective by name, and their contributions; empty where there are none or they cannot be computed.
     fn terms(&self, _design: &Design, _values: &[f64]) -> Vec<(String, f64)> {
         Vec::new()
+    }
+
+    /// Where the compliant mechanism is when its drives have these values (one list a place, rad or mm from the drawing
+    /// pose), followed from place to place.
+    ///
+    /// # Errors
+    /// Where no equilibrium is found.
+    fn respond(&self, _design: &Design, _values: &[f64], _drives: &[Vec<f64>]) -> Result<Response, Failed> {
+        Err(Failed::new())
     }
 
     /// What the instances of an assembly are to each other; `values` are those of each design. Nothing where there is one

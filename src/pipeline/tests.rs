@@ -3,6 +3,7 @@
 use super::*;
 use crate::diagnostic::SourceMap;
 use crate::emit::csv::{MotionState, MotionTable};
+use crate::ir::ExportKind;
 use crate::ir::expr::ExprGraph;
 use crate::ir::{
     Aggregate, Cycle, DriveUnit, Export, FreeVariable, JointId, Layers, Material, Motor, MotorInterface,
@@ -41,6 +42,7 @@ pub(super) fn design() -> Design {
             rest: 0.0,
             free_rest: None,
             motor: Some(Motor {
+                motion: Default::default(),
                 name: "m".into(),
                 interface: MotorInterface::Stepper { steps_per_turn: 200, microsteps: 8 },
                 stall_n_mm: 400.0,

@@ -217,6 +217,8 @@ pub enum StatementKind {
         /// What is measured.
         value: Expr,
     },
+    /// `workspace NAME, … by DRIVE from A to B [in N steps], …`
+    Workspace(Box<Workspace>),
     /// `target TRACE = …`
     Target {
         /// The trace.
@@ -577,4 +579,26 @@ pub enum BinaryOp {
     Divide,
     /// `^`
     Power,
+}
+
+/// `workspace NAME, … by DRIVE from A to B [in N steps], …`
+#[derive(Clone, Debug, PartialEq)]
+pub struct Workspace {
+    /// What is aimed at: names of outputs, or components of traces (`tip.x`).
+    pub wanted: Vec<Expr>,
+    /// The drives and how far each goes.
+    pub stretches: Vec<Stretch>,
+}
+
+/// `DRIVE from A to B [in N steps]`
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stretch {
+    /// The drive.
+    pub drive: Ident,
+    /// Its value at one end.
+    pub from: Expr,
+    /// At the other.
+    pub to: Expr,
+    /// Number of steps of the table.
+    pub steps: Option<Expr>,
 }

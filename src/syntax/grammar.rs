@@ -305,6 +305,8 @@ fn kind(rule: Rule) -> Kind {
         Rule::merging => Kind::Merging,
         Rule::st_mirror => Kind::Mirror,
         Rule::st_allow => Kind::Allow,
+        Rule::st_workspace => Kind::Workspace,
+        Rule::stretch => Kind::Stretch,
         Rule::sharing => Kind::Sharing,
         Rule::rod_axis => Kind::RodAxis,
         Rule::st_own => Kind::OwnBody,

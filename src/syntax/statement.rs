@@ -67,6 +67,10 @@ impl Lower<'_> {
                 StatementKind::Trace { name, direction, point: self.value(node)?, body }
             }
             Kind::Output => StatementKind::Output { name: self.ident(node)?, value: self.value(node)? },
+            Kind::Workspace => StatementKind::Workspace(Box::new(super::ast::Workspace {
+                wanted: node.all(Kind::Name).map(|n| self.expr(n)).collect(),
+                stretches: node.all(Kind::Stretch).filter_map(|n| self.stretch(n)).collect(),
+            })),
             Kind::Target => StatementKind::Target { trace: self.ident(node)?, value: self.value(node)? },
             Kind::Minimize => self.minimize(node),
             Kind::Require => self.require(node)?,
@@ -178,6 +182,12 @@ impl Lower<'_> {
         };
         let continuous = node.all(Kind::Keyword).any(|n| self.text(n) == "continuous");
         Some(StatementKind::Drive { joint, profile, motor, continuous, drum })
+    }
+
+    fn stretch(&mut self, node: &Node) -> Option<super::ast::Stretch> {
+        let mut ends = self.values(node.first(Kind::Range)?).into_iter();
+        let (from, to) = (ends.next()?, ends.next()?);
+        Some(super::ast::Stretch { drive: self.ident(node)?, from, to, steps: self.value(node) })
     }
 
     fn keys(&mut self, node: &Node) -> Profile {

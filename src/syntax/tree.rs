@@ -73,6 +73,8 @@ pub enum Kind {
     Rest,
     Trace,
     Output,
+    Workspace,
+    Stretch,
     Target,
     Minimize,
     Term,

@@ -51,6 +51,7 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
     "target",
     "tolerance",
     "variant",
+    "workspace",
 ];
 
 /// Whether a line starts a statement, as `statement_start` of the grammar has it.
@@ -96,6 +97,7 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "rest" => "rest JOINT at VALUE",
         "trace" => "trace NAME = POINT on BODY",
         "output" => "output NAME = angle(BODY about AXIS)",
+        "workspace" => "workspace OUTPUT by DRIVE from VALUE to VALUE in NUMBER steps",
         "target" => "target TRACE = path(\"FILE.csv\")",
         "minimize" => "minimize {",
         "term" => "TERM(…) weight NUMBER",

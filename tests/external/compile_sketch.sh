@@ -9,7 +9,7 @@ hardware=${pins%/variants/standard/pins_arduino.h}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 flags=(-mmcu=atmega328p -DF_CPU=16000000L -DARDUINO=10819 -DARDUINO_AVR_UNO -DARDUINO_ARCH_AVR
-    -Os -ffunction-sections -fdata-sections -I"$hardware/cores/arduino" -I"$hardware/variants/standard")
+    -Os -ffunction-sections -fdata-sections -I"$hardware/cores/arduino" -I"$hardware/variants/standard" ${SKETCH_FLAGS:-})
 avr-g++ "${flags[@]}" -std=gnu++14 -fno-exceptions -fno-threadsafe-statics \
     -Wall -Wextra -Werror -x c++ -c "$sketch" -o "$work/sketch.o"
 for source in "$hardware"/cores/arduino/*.{c,cpp,S}; do

@@ -1,7 +1,8 @@
 //! `export arduino(DRIVE)`: a sketch that runs a stepper motor through the cycle, pulse by pulse.
 //! All rounding happens here, once, on absolute positions: the sketch only counts.
 
-use crate::ir::{Design, DriveUnit, MotorInterface};
+use super::motion::comment;
+use super::template;
 use serde::Serialize;
 use std::f64::consts::TAU;
 use std::fmt;
@@ -15,8 +16,10 @@ pub const LONGEST_CYCLE_US: u32 = 1_800_000_000;
 pub const MOST_STATES: usize = 7000;
 /// Farthest position from rest, microsteps: keeps every product in the sketch below 32 bits.
 pub const FARTHEST_PULSES: i32 = 1 << 24;
-/// Speed at which the crank goes from the rest pose to the first state, turns per second.
-const APPROACH_TURNS_PER_S: f64 = 0.25;
+/// Speed of a move to a pose, turns a second.
+const MOVE_TURNS_PER_S: f64 = 0.25;
+/// Acceleration where the motor states none, turns/s²: a common stepper with a small crank follows that.
+const USUAL_TURNS_PER_S2: f64 = 4.0;
 /// How far from whole turns a closed profile may be, turns (rounding of degrees to radians is 1e-16).
 const CLOSED_TOLERANCE_TURNS: f64 = 1e-6;
 
@@ -39,22 +42,13 @@ pub struct Sketch {
     pub closed: bool,
     /// Drive value in the rest pose, relative to the drawing pose, rad.
     pub rest_rad: f64,
+    /// What the motor states of its acceleration, rad/s².
+    pub acceleration_rad_s2: Option<f64>,
 }
 
 /// Why no sketch can be written.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SketchError {
-    /// The design has no such drive.
-    NoDrive,
-    /// The drive slides, and no drum says how a motor turns for it.
-    Slides,
-    /// The drive names no motor.
-    NoMotor,
-    /// The motor is not a stepper.
-    NotAStepper {
-        /// Name of the motor.
-        motor: String,
-    },
     /// Steps per turn or microsteps are zero or too many for 16 bits.
     Resolution,
     /// Fewer than one interval or more than [`MOST_STATES`].
@@ -88,12 +82,6 @@ pub enum SketchError {
 impl fmt::Display for SketchError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoDrive => write!(f, "there is no such drive"),
-            Self::Slides => write!(f, "the drive slides, and has no drum"),
-            Self::NoMotor => write!(f, "the drive has no motor"),
-            Self::NotAStepper { motor } => {
-                write!(f, "`{motor}` is not a stepper, and sketches for other motors are not available yet")
-            }
             Self::Resolution => {
                 write!(f, "steps per turn and microsteps must both lie between 1 and 65535")
             }
@@ -140,39 +128,6 @@ pub struct StepTable {
 }
 
 impl Sketch {
-    /// What the sketch of a design's drive needs to know; `values` are the free variables in the design's order.
-    ///
-    /// # Errors
-    /// When there is no such drive, or its motor is not a stepper.
-    pub fn of(design: &Design, drive: usize, values: &[f64]) -> Result<Self, SketchError> {
-        let drive = design.drives.get(drive).ok_or(SketchError::NoDrive)?;
-        if drive.unit != DriveUnit::Rad && drive.drum_radius_mm.is_none() {
-            return Err(SketchError::Slides);
-        }
-        let motor = drive.motor.as_ref().ok_or(SketchError::NoMotor)?;
-        let MotorInterface::Stepper { steps_per_turn, microsteps } = motor.interface else {
-            return Err(SketchError::NotAStepper { motor: motor.name.clone() });
-        };
-        let states = design.cycle.steps;
-        if states == 0 || states > MOST_STATES {
-            return Err(SketchError::States { states });
-        }
-        let rest = drive.rest_value(&design.exprs.values(values));
-        let angle =
-            |state| drive.motor_angle_rad(state as f64 / states as f64, rest).ok_or(SketchError::Slides);
-        Ok(Self {
-            mechanism: design.name.clone(),
-            drive: drive.name.clone(),
-            steps_per_turn,
-            microsteps,
-            angles_rad: (0..=states).map(angle).collect::<Result<_, _>>()?,
-            duration_s: design.cycle.duration_s,
-            closed: drive.is_closed(),
-            // Of a drum the motor's own angle counts, which is zero at rest.
-            rest_rad: if drive.unit == DriveUnit::Rad { rest } else { 0.0 },
-        })
-    }
-
     /// Name of the sketch: of its folder and, with `.ino`, of its file, as the Arduino IDE wants it.
     pub fn name(&self) -> String {
         let name: String = format!("{}_{}", self.mechanism, self.drive)
@@ -254,28 +209,20 @@ impl Sketch {
     /// When the cycle does not fit a sketch (see [`Sketch::table`]).
     pub fn render(&self) -> Result<String, SketchError> {
         let table = self.table()?;
-        let faulty = |e: minijinja::Error| SketchError::Template(e.to_string());
-        let mut environment = minijinja::Environment::new();
-        let syntax = minijinja::syntax::SyntaxConfig::builder()
-            .trim_blocks(true)
-            .lstrip_blocks(true)
-            .keep_trailing_newline(true)
-            .build()
-            .map_err(faulty)?;
-        environment.set_syntax(syntax);
-        environment.set_undefined_behavior(minijinja::UndefinedBehavior::Strict);
-        environment.add_template("sketch", include_str!("sketch.ino.jinja")).map_err(faulty)?;
-        let template = environment.get_template("sketch").map_err(faulty)?;
-        template.render(minijinja::value::Serde(self.context(&table))).map_err(faulty)
+        let main = ("sketch.ino", include_str!("sketch.ino.jinja"));
+        template::render(&[main], &self.context(&table)).map_err(SketchError::Template)
     }
 
     fn context(&self, table: &StepTable) -> Context {
         let first = i64::from(table.targets.first().copied().unwrap_or(0));
         let last = i64::from(table.targets.last().copied().unwrap_or(0));
-        let start = table.targets.get(table.start_state).copied().unwrap_or(0).unsigned_abs();
-        let approach_us = (f64::from(start) / f64::from(table.pulses_per_turn) / APPROACH_TURNS_PER_S * 1e6)
-            .max(f64::from(start) * f64::from(LEAST_PULSE_GAP_US))
-            .clamp(1e6, f64::from(LONGEST_CYCLE_US));
+        let a_turn = f64::from(table.pulses_per_turn);
+        let acceleration = self.acceleration_rad_s2.map_or(USUAL_TURNS_PER_S2, |a| a / TAU) * a_turn;
+        let move_speed = (MOVE_TURNS_PER_S * a_turn).clamp(1.0, 1e6 / f64::from(LEAST_PULSE_GAP_US));
+        // Until the clock of the cycle runs at full speed: so long that its fastest part is reached by this acceleration.
+        let states = (table.targets.len() - 1) as f64;
+        let top_speed = f64::from(table.most_pulses) * states / f64::from(table.cycle_us) * 1e6;
+        let ramp_us = (top_speed / acceleration * 1e6).ceil().clamp(1.0, 60e6);
         // The last comma of an initialiser is allowed in C++, so every row may end with one.
         let rows = table
             .targets
@@ -292,8 +239,10 @@ impl Sketch {
             cycle_us: table.cycle_us,
             states: table.targets.len() - 1,
             start_state: table.start_state,
-            // A position not reached yet takes at least a second; none at all takes no time.
-            approach_us: if start == 0 { 0 } else { approach_us as u32 },
+            acceleration: (acceleration.round().max(1.0)) as u32,
+            move_speed: move_speed as u32,
+            ramp_us: ramp_us as u32,
+            top_speed: top_speed.ceil() as u32,
             most_pulses: table.most_pulses,
             least_gap_us: LEAST_PULSE_GAP_US,
             longest_us: LONGEST_CYCLE_US,
@@ -317,7 +266,10 @@ struct Context {
     cycle_us: u32,
     states: usize,
     start_state: usize,
-    approach_us: u32,
+    acceleration: u32,
+    move_speed: u32,
+    ramp_us: u32,
+    top_speed: u32,
     most_pulses: u32,
     least_gap_us: u32,
     longest_us: u32,
@@ -335,12 +287,6 @@ fn whole(pulses: f64, state: usize) -> Result<i32, SketchError> {
     } else {
         Err(SketchError::Position { state })
     }
-}
-
-/// Text that cannot end a `//` comment or join it with the next line, whatever the user wrote.
-fn comment(text: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || " _-.,()".contains(c);
-    text.chars().take(80).map(|c| if plain(c) { c } else { '_' }).collect()
 }
 
 #[cfg(test)]

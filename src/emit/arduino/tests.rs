@@ -14,6 +14,7 @@ pub(crate) fn crank() -> Sketch {
         duration_s: 2.0,
         closed: true,
         rest_rad: 30_f64.to_radians(),
+        acceleration_rad_s2: None,
     }
 }
 

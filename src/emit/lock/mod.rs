@@ -141,12 +141,18 @@ pub fn design_digest(design: &Design) -> String {
     if let Value::Object(fields) = &mut value {
         fields.remove("exports");
         fields.remove("requirements");
+        for drive in fields.get_mut("drives").and_then(Value::as_array_mut).into_iter().flatten() {
+            if let Some(Value::Object(motor)) = drive.get_mut("motor") {
+                motor.remove("motion");
+            }
+        }
         if let Some(Value::Object(process)) = fields.get_mut("process") {
             process.remove("machine");
         }
         // Angles are only looked at.
         if let Some(Value::Object(aims)) = fields.get_mut("aims") {
             aims.remove("angles");
+            aims.remove("workspaces");
             if aims.is_empty() {
                 fields.remove("aims");
             }
