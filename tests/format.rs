@@ -82,6 +82,10 @@ fn any_white_space_comes_out_the_same() {
                 let line = line.trim();
                 // Within a comment, every space is the author's.
                 let (code, comment) = line.split_at(line.find("//").unwrap_or(line.len()));
+                if code.contains('"') {
+                    // So it is in a text.
+                    return format!("\t{line}   \r\n\r\n\r\n");
+                }
                 let words: Vec<&str> = code.split_whitespace().collect();
                 format!("\t{}   {comment}  \r\n\r\n\r\n", words.join("\t "))
             })

@@ -519,7 +519,7 @@ fn merged_grounds_are_one_part() {
     let (artefacts, found) = Compiler::default().parts(&a, &starts).unwrap();
     assert_eq!(found, []);
     let parts = meshes(&artefacts);
-    assert_eq!(parts.iter().map(|p| p.0.as_str()).collect::<Vec<_>>(), ["twins_board.stl"]);
+    assert_eq!(parts.iter().map(|p| p.0.as_str()).collect::<Vec<_>>(), ["assembled/twins_board.stl"]);
     assert!(check_mesh(&parts[0].1).is_printable());
     common::accepted_by_others(&artefacts);
 }
@@ -552,7 +552,8 @@ fn board(points: &str) -> (Vec<(String, Mesh)>, Vec<String>) {
         .replace("place big = lever at (0 mm, 90 mm)    scale = 1.5", "")
         .replace("big.", "two.")
         .replace("at (-20 mm, 20 mm)  turned 90 deg about z ", "at (0 mm, 0 mm, 40 mm)")
-        .replace("ground board { }", &format!("{points}\n"));
+        .replace("ground board { }", &format!("{points}\n"))
+        .replace("export stl", "export stl(assembled)");
     let a = assembly(&text);
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
     let (artefacts, found) = Compiler::default().parts(&a, &starts).unwrap();

@@ -158,7 +158,9 @@ fn a_slack_string_is_told() {
         let checked = flexura::pipeline::check_requirements(&design, &simulation.unwrap(), &mut told);
         (out.diagnostics, checked, text)
     };
-    let (found, checked, _) = run(&finger());
+    let (mut found, checked, _) = run(&finger());
+    // Lints have tests of their own.
+    found.retain(|d| !d.code.starts_with("W1"));
     // All links lie in one layer: as printed bodies they meet, which is told too.
     assert!(found.iter().all(|d| ["W0635", "W0636"].contains(&d.code.as_str())), "{found:?}");
     assert!(checked[0].pass && checked[0].value == Some(0.0), "{checked:?}");

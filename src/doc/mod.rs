@@ -107,7 +107,8 @@ fn first_sentence(text: &str) -> String {
     let ends = |at: usize| {
         let (before, after) = (line.get(..at).unwrap_or_default(), line.get(at + 2..).unwrap_or_default());
         let word = before.rsplit(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
-        word.chars().count() > 2 && !after.starts_with(|c: char| c.is_ascii_digit())
+        (before.ends_with(')') || word.chars().count() > 2)
+            && !after.starts_with(|c: char| c.is_ascii_digit())
     };
     match line.match_indices(". ").find(|(at, _)| ends(*at)) {
         Some((at, _)) => line.get(..=at).unwrap_or_default().to_string(),

@@ -168,9 +168,10 @@ impl Here<'_> {
                     _ => CompletionItemKind::VARIABLE,
                 }),
                 detail: (!p.detail.is_empty()).then_some(p.detail),
-                documentation: (!p.doc.is_empty()).then(|| {
-                    Documentation::MarkupContent(MarkupContent { kind: MarkupKind::Markdown, value: p.doc })
-                }),
+                documentation: (!p.doc.is_empty()).then_some(Documentation::MarkupContent(MarkupContent {
+                    kind: MarkupKind::Markdown,
+                    value: p.doc,
+                })),
                 label: p.label,
                 ..Default::default()
             })

@@ -104,7 +104,9 @@ fn run(
     out.requirements = assembly::check_all(&assembly, &simulations, &placed, &between, &mut out.diagnostics);
     if extent >= Extent::Volume && assembly.exports.iter().any(|e| e.export.kind == ExportKind::Stl) {
         // What cannot be printed is no finding here: a build tells it.
-        let parts = stages.parts(&assembly, &found.values).ok();
+        let mut solids = assembly.clone();
+        solids.exports.retain(|e| e.export.kind == ExportKind::Stl);
+        let parts = stages.parts(&solids, &found.values).ok();
         found.volume_mm3 = parts.map(|(parts, _)| parts.iter().map(|p| volume_mm3(&p.bytes)).sum());
     }
     Some(())

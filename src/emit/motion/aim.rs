@@ -284,7 +284,8 @@ fn two(grid: &Grid, a: &GridAxis, b: &GridAxis) -> Result<AimTable, AimError> {
         format!("{}, {}", stretch(a, i0, i1), stretch(b, j0, j1))
     };
     let cells = || (0..is.len() - 1).flat_map(|i| (0..js.len() - 1).map(move |j| (i, j)));
-    let triangles: Vec<((usize, usize), [[f64; 2]; 3])> = cells()
+    type Triangle = [[f64; 2]; 3];
+    let triangles: Vec<((usize, usize), Triangle)> = cells()
         .flat_map(|(i, j)| [false, true].map(|upper| ((i, j), corners(i, j, upper).map(|(k, l)| node(k, l)))))
         .collect();
     let area = |t: &[[f64; 2]; 3]| {

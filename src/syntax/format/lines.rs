@@ -135,7 +135,9 @@ impl<'a> Builder<'a> {
                 // At the very start of the file; `format` sees to it.
                 Kind::ByteOrderMark => {}
                 _ => {
-                    self.starts |= is_block(node.kind) && !child.children.is_empty();
+                    // The bounds of a loop are no lines of its block.
+                    let bound = node.kind == Kind::For && child.kind == Kind::Value;
+                    self.starts |= is_block(node.kind) && !bound && !child.children.is_empty();
                     self.column = cells::column(node, at, self.source).or(self.column.take());
                     if table && child.kind == Kind::Argument {
                         self.column =

@@ -37,7 +37,10 @@ pub fn format(file: u32, text: &str) -> Result<Formatted, Box<Diagnostic>> {
     let (lines, left) = lines::lines(&parse.tree, text);
     let end = if text.contains("\r\n") { "\r\n" } else { "\n" };
     let mark = if text.starts_with('\u{FEFF}') { "\u{FEFF}" } else { "" };
-    let new = format!("{mark}{}", layout::print(lines, end, !text.ends_with(['\n', '\r'])));
+    // A mark behind empty lines is none: at the very start it would become one.
+    let printed = layout::print(lines, end, !text.ends_with(['\n', '\r']));
+    let first = if mark.is_empty() && printed.starts_with('\u{FEFF}') { end } else { mark };
+    let new = format!("{first}{printed}");
     match difference(&parse.tree, text, &super::parse(file, &new).tree, &new) {
         None => Ok(Formatted { text: new, left }),
         Some(at) => {
