@@ -207,8 +207,8 @@ fn is_broken(node: &Node) -> bool {
 
 /// Every `step`th place of an example: without the character there the rest is still understood, and what is still
 /// valid has one look.
-fn deletions(step: usize) {
-    for (name, text) in examples() {
+fn deletions(designs: Vec<(String, String)>, step: usize) {
+    for (name, text) in designs {
         let all = understood(&text);
         for (at, c) in text.char_indices().step_by(step) {
             let less = format!("{}{}", &text[..at], &text[at + c.len_utf8()..]);
@@ -232,8 +232,8 @@ fn deletions(step: usize) {
 }
 
 /// Every `step`th prefix: what stood on whole lines before its last one is understood.
-fn prefixes(step: usize) {
-    for (name, text) in examples() {
+fn prefixes(designs: Vec<(String, String)>, step: usize) {
+    for (name, text) in designs {
         for (end, _) in text.char_indices().step_by(step) {
             let prefix = &text[..end];
             let lines = prefix[..prefix.rfind('\n').unwrap_or(0)].lines();
@@ -253,25 +253,25 @@ fn prefixes(step: usize) {
 
 #[test]
 fn deletions_of_one_character() {
-    deletions(23);
+    deletions(examples(), 23);
 }
 
 #[test]
 fn prefixes_of_the_examples() {
-    prefixes(101);
+    prefixes(examples(), 101);
 }
 
 #[test]
 fn every_deletion_of_one_character() {
     if !skipped() {
-        deletions(1);
+        deletions(files("examples"), 1);
     }
 }
 
 #[test]
 fn every_prefix() {
     if !skipped() {
-        prefixes(1);
+        prefixes(files("examples"), 1);
     }
 }
 
