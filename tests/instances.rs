@@ -519,7 +519,7 @@ fn merged_grounds_are_one_part() {
     let (artefacts, found) = Compiler::default().parts(&a, &starts).unwrap();
     assert_eq!(found, []);
     let parts = meshes(&artefacts);
-    assert_eq!(parts.iter().map(|p| p.0.as_str()).collect::<Vec<_>>(), ["assembled/twins_board.stl"]);
+    assert_eq!(parts.iter().map(|p| p.0.as_str()).collect::<Vec<_>>(), ["twins_board.stl"]);
     assert!(check_mesh(&parts[0].1).is_printable());
     common::accepted_by_others(&artefacts);
 }
@@ -571,7 +571,7 @@ fn a_ground_with_points_joins_what_is_merged_into_it() {
         ground board { A, B }",
     );
     assert_eq!(found, [""; 0]);
-    assert_eq!(parts.iter().map(|p| p.0.as_str()).collect::<Vec<_>>(), ["twins_board.stl"]);
+    assert_eq!(parts.iter().map(|p| p.0.as_str()).collect::<Vec<_>>(), ["assembled/twins_board.stl"]);
     assert!(check_mesh(&parts[0].1).is_printable());
     let alone: f64 = pieces.iter().map(|p| p.1.volume_mm3()).sum();
     assert!(parts[0].1.volume_mm3() > alone);
