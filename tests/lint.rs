@@ -390,5 +390,5 @@ fn the_examples_are_free_of_warnings() {
             }
         }
     }
-    assert_eq!(count, 8);
+    assert_eq!(count, 9);
 }

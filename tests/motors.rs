@@ -388,9 +388,13 @@ fn locked(folder: &str, name: &str, mechanism: &str, more: &str, exports: &str) 
     let text = std::fs::read_to_string(path.join(format!("{name}.mech"))).unwrap();
     let lock = std::fs::read_to_string(path.join(format!("{name}.lock"))).unwrap();
     let head = format!("mechanism {mechanism} {{\n");
-    assert!(text.contains(&head) && text.contains("    export stl\n"));
+    assert!(text.contains(&head) && text.contains("    export stl"));
     let text = text.replace(&head, &format!("{head}{more}\n"));
-    (text.replace("    export stl\n", &format!("    export {exports}\n")), lock)
+    let line = |l: &str| match l.trim_start().starts_with("export ") {
+        true => format!("    export {exports}\n"),
+        false => format!("{l}\n"),
+    };
+    (text.lines().map(line).collect(), lock)
 }
 
 /// Aims at a hundred random targets through the JSON table and asks the solver where the mechanism is then.
