@@ -11,7 +11,7 @@ mod lines;
 use super::tree::{Kind, Node};
 use crate::diagnostic::{Diagnostic, Origin};
 
-/// What [`format`] gives.
+/// What [`format()`] gives.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Formatted {
     /// The text with its new look.
