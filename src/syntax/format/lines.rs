@@ -259,7 +259,7 @@ impl<'a> Builder<'a> {
 /// No space between the child and what stands before it.
 fn tight_before(node: &Node, at: usize, text: &str) -> bool {
     match text {
-        "," | ")" | ":" | "^" => true,
+        "," | ")" | ":" | "^" | "[" | "]" => true,
         "(" => node.kind == Kind::Call,
         "." => true,
         _ => match node.kind {
@@ -274,7 +274,7 @@ fn tight_before(node: &Node, at: usize, text: &str) -> bool {
 /// No space behind a token.
 fn tight_after(node: &Node, text: &str) -> bool {
     match text {
-        "(" | "." | "^" => true,
+        "(" | "[" | "." | "^" => true,
         "-" => node.kind == Kind::Unary,
         _ => false,
     }
