@@ -345,6 +345,14 @@ fn any_pieces(cases: u32) {
         .unwrap();
 }
 
+/// What was found at random once.
+#[test]
+fn what_is_left_at_the_end_keeps_the_end_of_its_line() {
+    for text in ["track(tip) weight 2let b=material p {\n\t", "x {\n  ", "x {\r\n\t", "x {  ", "x {"] {
+        holds(text);
+    }
+}
+
 #[test]
 fn pieces_at_random() {
     any_pieces(500);
