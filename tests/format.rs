@@ -354,6 +354,14 @@ fn what_is_left_at_the_end_keeps_the_end_of_its_line() {
 }
 
 #[test]
+fn a_power_of_a_length_is_no_area() {
+    let area = holds("mechanism m {\nrequire a <= 2 mm^2\n}\n");
+    assert!(area.contains("2 mm^2"), "{area}");
+    let power = holds("mechanism m {\nrequire a <= 2 mm ^ 2\n}\n");
+    assert!(power.contains("2 mm ^2"), "{power}");
+}
+
+#[test]
 fn pieces_at_random() {
     any_pieces(500);
 }
