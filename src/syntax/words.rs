@@ -113,6 +113,7 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "for" => "for NAME in FIRST .. LAST {",
         "string" => "string NAME: BODY at POINT to BODY via POINT",
         "allow" => "allow CODE \"REASON\"",
+        "hole" => "hole DIAMETER on BODY at POINT",
         "load" => "load FORCE along DIRECTION on BODY at POINT",
         _ => return None,
     })
