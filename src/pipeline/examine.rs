@@ -107,7 +107,7 @@ fn run(
         let mut solids = assembly.clone();
         solids.exports.retain(|e| e.export.kind == ExportKind::Stl);
         let parts = stages.parts(&solids, &found.values).ok();
-        found.volume_mm3 = parts.map(|(parts, _)| parts.iter().map(|p| volume_mm3(&p.bytes)).sum());
+        found.volume_mm3 = parts.map(|p| p.artefacts.iter().map(|p| volume_mm3(&p.bytes)).sum());
     }
     Some(())
 }
