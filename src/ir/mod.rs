@@ -676,6 +676,8 @@ pub enum ExportKind {
     Png,
     /// A drawing of the rest pose.
     Svg,
+    /// A page that shows all of it.
+    Report,
     /// Arduino sketch for one drive. Index into [`Design::drives`].
     Arduino(usize),
     /// Code or keyframes for these drives, all where none is named. Indices into [`Design::drives`].

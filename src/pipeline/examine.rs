@@ -108,7 +108,7 @@ fn run(
         // Without exports each part comes once, whatever is asked for.
         solids.exports.clear();
         let parts = stages.parts(&solids, &found.values).ok();
-        found.volume_mm3 = parts.map(|(parts, _)| parts.iter().map(|p| volume_mm3(&p.bytes)).sum());
+        found.volume_mm3 = parts.map(|p| p.artefacts.iter().map(|p| volume_mm3(&p.bytes)).sum());
     }
     Some(())
 }
