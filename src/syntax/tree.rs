@@ -105,6 +105,7 @@ pub enum Kind {
     Variant,
     Setting,
     For,
+    Case,
     Later,
     // items
     File,
