@@ -60,6 +60,7 @@ pub fn simulate(arguments: &Simulate) -> u8 {
     };
     opened.request.fresh = arguments.fresh;
     opened.request.frozen = arguments.frozen;
+    opened.request.case.clone_from(&arguments.case);
     if let Err(why) = opened.read_lock(common, &arguments.out) {
         return unreadable(common, &why);
     }

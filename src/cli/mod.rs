@@ -209,6 +209,9 @@ struct Simulate {
     /// The conventional mechanism's motion
     #[arg(long)]
     rigid: bool,
+    /// Under the load case of this name
+    #[arg(long, value_name = "NAME", value_parser = word)]
+    case: Option<String>,
     /// Add the pose of every moving body: translation t (mm) and rotation vector (rad) from the rest pose
     ///
     /// A point of the body that lies at X in the rest pose lies at x = t + R X, with R the rotation by the

@@ -6,6 +6,7 @@
 mod aims;
 mod arithmetic;
 mod assertions;
+mod cases;
 mod check;
 pub mod codes;
 pub mod dimension;

@@ -16,7 +16,7 @@ pub use assembly::{Assembly, Instance, Placement};
 pub use code::{CodeKind, MotorMotion, Stretch, Wanted, Workspace};
 pub use drive::{Cable, Drive, DriveOn, DriveUnit, Profile};
 use expr::{ExprGraph, ExprId};
-pub use load::{Load, LoadKind};
+pub use load::{Load, LoadCase, LoadKind};
 pub use model::RodModel;
 use serde::{Deserialize, Serialize};
 pub use solution::Solution;
@@ -54,6 +54,9 @@ pub struct Design {
     /// Loads from outside.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub loads: Vec<Load>,
+    /// Load cases: the cycle once more under further loads.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cases: Vec<LoadCase>,
     /// Steps and duration.
     pub cycle: Cycle,
     /// Traced points.
@@ -89,7 +92,7 @@ impl Design {
         roots.extend(self.traces.iter().flat_map(|t| t.point));
         roots.extend(self.strings.iter().flat_map(|c| c.via.iter().flatten().chain(&c.point)));
         roots.extend(self.drives.iter().filter_map(|d| d.free_rest));
-        for load in &self.loads {
+        for load in self.all_loads() {
             match &load.kind {
                 LoadKind::Force { point, .. } => roots.extend(point),
                 // Links are weighed by their skeletons.

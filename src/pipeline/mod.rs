@@ -53,6 +53,8 @@ pub struct Request {
     pub steps: Option<usize>,
     /// `--variant`.
     pub variant: Option<String>,
+    /// Of [`simulate`] only: under this load case.
+    pub case: Option<String>,
     /// The lock as it stands: its name and text.
     pub lock: Option<(String, String)>,
     /// Ignore the lock, and what has been made before.
@@ -276,7 +278,11 @@ pub fn simulate(
             }
             found
         };
-        let placed = assembly::place(&assembly, &simulations);
+        let mut placed = assembly::place(&assembly, &simulations);
+        if let Some(case) = &request.case {
+            placed = keep(assembly::under(&assembly, placed, case), &mut out.diagnostics)?;
+            between = Between::default();
+        }
         let mut simulation = assembly::combine(&assembly, placed, &between);
         if !show.poses {
             simulation.motion.bodies.clear();
@@ -397,7 +403,7 @@ fn solve(
             design.free.iter().map(|v| v.start).collect()
         }
     };
-    let solved = if design.free.is_empty() || design.objectives.is_empty() {
+    let solved = if design.free.is_empty() || design.all_objectives().next().is_none() {
         // Nothing to decide, or nothing to decide it by.
         let values = design.free.iter().map(|v| v.path.clone()).zip(start).collect();
         Solved { solution: Solution { values, iterations: 0, converged: true }, ..Solved::default() }

@@ -52,6 +52,9 @@ pub struct Simulation {
     pub sway_mm: Vec<f64>,
     /// Of a conventional motion, the motion.
     pub conventional: Option<Motion>,
+    /// The same under each of the design's load cases, without what only solids and released drives show; of a
+    /// conventional motion nothing.
+    pub cases: Vec<Simulation>,
     /// Findings that do not stop the work.
     pub diagnostics: Vec<Diagnostic>,
 }

@@ -257,6 +257,8 @@ pub enum StatementKind {
     Variant(Box<Variant>),
     /// `for NAME in A .. B { … }`: repeats instances
     For(Box<For>),
+    /// `case NAME { load … minimize { … } require … }`: the cycle once more, under other loads
+    Case(Box<Case>),
     /// `body NAME`: a body that a template brings along (templates only)
     OwnBody {
         /// Name.
@@ -421,6 +423,15 @@ pub struct For {
     /// Its last value.
     pub last: Expr,
     /// `place`, `mirror`, `require`, `export`, `for`.
+    pub statements: Vec<Statement>,
+}
+
+/// A load case: what the mechanism meets besides its own loads, and what is asked of it there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Case {
+    /// Name.
+    pub name: Ident,
+    /// `load`, `minimize`, `require`.
     pub statements: Vec<Statement>,
 }
 

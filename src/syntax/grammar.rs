@@ -322,6 +322,7 @@ fn kind(rule: Rule) -> Kind {
         Rule::st_variant => Kind::Variant,
         Rule::setting => Kind::Setting,
         Rule::st_for => Kind::For,
+        Rule::st_case => Kind::Case,
         Rule::st_later => Kind::Later,
         Rule::value => Kind::Value,
         Rule::free => Kind::Free,

@@ -96,6 +96,7 @@ impl Lower<'_> {
             Kind::Assert => StatementKind::Assert(Box::new(self.assertion(node)?)),
             Kind::Variant => StatementKind::Variant(Box::new(self.variant(node)?)),
             Kind::For => StatementKind::For(Box::new(self.repeated(node)?)),
+            Kind::Case => StatementKind::Case(Box::new(self.case(node)?)),
             Kind::Later => StatementKind::Later { keyword: self.named(node.first(Kind::Keyword)?) },
             _ => return None,
         })

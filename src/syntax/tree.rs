@@ -106,6 +106,7 @@ pub enum Kind {
     Variant,
     Setting,
     For,
+    Case,
     Later,
     // items
     File,

@@ -94,8 +94,8 @@ struct Builder<'a> {
 
 /// Nodes whose parts are statements, one a line.
 fn is_block(kind: Kind) -> bool {
-    use Kind::{BadHeader, File, Flexure, For, Mechanism, Minimize, Record, Rod};
-    matches!(kind, File | Mechanism | Flexure | Record | Minimize | Rod | For | BadHeader)
+    use Kind::{BadHeader, Case, File, Flexure, For, Mechanism, Minimize, Record, Rod};
+    matches!(kind, File | Mechanism | Flexure | Record | Minimize | Rod | For | Case | BadHeader)
 }
 
 /// Whether a value is one call and nothing else.
