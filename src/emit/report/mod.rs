@@ -16,7 +16,7 @@ use super::sheet;
 use crate::diagnostic::Severity;
 use askama::Template;
 use nalgebra::Vector3;
-use text::number;
+use text::{glance, marked, number};
 
 /// All that a report shows beside what it works out itself.
 #[derive(Clone, Debug)]
@@ -165,10 +165,13 @@ impl Solved {
         [number(self.terms.iter().map(|t| t.1).sum()), number(self.terms.iter().map(|t| t.2).sum())]
     }
 
-    /// Name, start, end, and the end as a part of the start in percent.
+    /// Name, start, end, and how much less that is.
     fn rows(&self) -> Vec<(&str, String, String, String)> {
-        let part = |a: f64, b: f64| {
-            if a > 0.0 && b <= a { format!("−{:.0} %", 100.0 * (1.0 - b / a)) } else { String::new() }
+        let part = |a: f64, b: f64| match b / a {
+            _ if a <= 0.0 || b <= 0.0 => String::new(),
+            r if r < 0.01 => format!("÷ {}", glance(1.0 / r)),
+            r if r <= 1.0 => format!("−{:.0} %", 100.0 * (1.0 - r)),
+            r => format!("+{:.0} %", 100.0 * (r - 1.0)),
         };
         self.terms.iter().map(|(n, a, b)| (n.as_str(), number(*a), number(*b), part(*a, *b))).collect()
     }
@@ -256,7 +259,15 @@ struct Page<'r> {
 
 impl Page<'_> {
     fn shown(&self, value: &Option<f64>) -> String {
-        value.map_or("–".into(), number)
+        value.map_or("–".into(), glance)
+    }
+
+    fn short(&self, value: &f64) -> String {
+        glance(*value)
+    }
+
+    fn marked(&self, text: &str) -> String {
+        marked(text)
     }
 
     fn plain(&self, value: &f64) -> String {

@@ -1,7 +1,7 @@
 //! A quantity over the cycle as inline SVG. Colours are the page's own (classes), so that it follows light and dark; the
 //! page's script moves the cursor.
 
-use super::text::number;
+use super::text::{escaped, number};
 use std::fmt::Write;
 
 /// Size of a plot and of the room for its axes, in the units of its view box: pixels on a phone.
@@ -218,10 +218,6 @@ fn tick(v: f64, range: f64) -> String {
     let plain = format!("{v:.digits$}");
     let plain = if plain.contains('.') { plain.trim_end_matches('0').trim_end_matches('.') } else { &plain };
     if plain == "-0" { "0".into() } else { plain.replace('-', "−") }
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

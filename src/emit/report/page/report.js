@@ -327,23 +327,51 @@ function build(block) {
     // The wheel scrolls the page until the view is taken into hand.
     canvas.addEventListener("pointerdown", () => { controls.enableZoom = true; });
     canvas.addEventListener("focusout", () => { controls.enableZoom = false; });
-    const middle = bounds.getCenter(new T.Vector3());
     const from = { iso: [0.45, 0.38, 1], front: [0, 0, 1], top: [0, 1, 0.0001], right: [1, 0, 0] };
     if (data.flat && Math.abs(data.flat[2]) > 0.9) from.iso = [0.28, 0.3, 1];
+    // Where something is at some time: what a view has to hold.
+    const places = [];
+    for (const link of data.links) {
+        const all = positions(block, link.v), { p, q } = frames(block, link.s), states = p.length / 3;
+        if (!states || !all.length) continue;
+        const low = [Infinity, Infinity, Infinity], high = low.map((x) => -x);
+        for (let k = 0; k < all.length; k++) {
+            low[k % 3] = Math.min(low[k % 3], all[k]);
+            high[k % 3] = Math.max(high[k % 3], all[k]);
+        }
+        for (let a = 0; a < states; a += Math.max(Math.floor(states / 6), 1)) {
+            turn.fromArray(q, 4 * a).normalize();
+            for (let c = 0; c < 8; c++) {
+                const corner = new T.Vector3(c & 1 ? high[0] : low[0], c & 2 ? high[1] : low[1], c & 4 ? high[2] : low[2]);
+                places.push(corner.applyQuaternion(turn).add(point.fromArray(p, 3 * a)));
+            }
+        }
+    }
+    for (const trace of data.traces) {
+        const all = positions(block, trace.path);
+        for (let k = 0; k < all.length; k += 3) places.push(new T.Vector3().fromArray(all, k));
+    }
     let view = "iso";
     const fit = (name) => {
+        if (!places.length) return;
         view = name || view;
         const towards = new T.Vector3(...from[view]).normalize();
         const right = new T.Vector3(0, 1, 0).cross(towards).normalize(), up = towards.clone().cross(right);
-        // As near as all corners of what is seen allow.
-        const slope = Math.tan(camera.fov * Math.PI / 360);
+        const extent = (axis) => {
+            const all = places.map((p) => p.dot(axis));
+            return [Math.min(...all), Math.max(...all)];
+        };
+        const ends = [extent(right), extent(up), extent(towards)];
+        const middle = new T.Vector3();
+        [right, up, towards].forEach((axis, k) => middle.addScaledVector(axis, (ends[k][0] + ends[k][1]) / 2));
+        // As near as all of it allows; above stand the buttons, below the scale.
+        const slope = Math.tan(camera.fov * Math.PI / 360), room = 1 - 84 / Math.max(stage.clientHeight, 200);
         let far = 0;
-        for (let k = 0; k < 8; k++) {
-            const corner = new T.Vector3(k & 1 ? bounds.max.x : bounds.min.x, k & 2 ? bounds.max.y : bounds.min.y, k & 4 ? bounds.max.z : bounds.min.z).sub(middle);
-            const depth = corner.dot(towards);
-            far = Math.max(far, depth + Math.abs(corner.dot(up)) / slope, depth + Math.abs(corner.dot(right)) / (slope * camera.aspect));
+        for (const p of places) {
+            const away = p.clone().sub(middle), depth = away.dot(towards);
+            far = Math.max(far, depth + Math.abs(away.dot(up)) / (slope * room), depth + Math.abs(away.dot(right)) / (slope * camera.aspect * 0.94));
         }
-        camera.position.copy(middle).addScaledVector(towards, far * 1.12);
+        camera.position.copy(middle).addScaledVector(towards, Math.max(far, size / 10));
         camera.near = size / 500; camera.far = size * 20;
         camera.updateProjectionMatrix();
         controls.target.copy(middle);
