@@ -52,6 +52,7 @@ pub(super) fn design() -> Design {
             origin,
         }],
         loads: Vec::new(),
+        cases: Vec::new(),
         strings: Vec::new(),
         cycle: Cycle { steps: 4, duration_s: 2.0, origin },
         traces: vec![Trace { name: "tip".into(), body: 0, point: [zero; 3], origin }],
