@@ -38,10 +38,7 @@ pub fn ir(common: &Common) -> u8 {
             };
             match text {
                 Ok(text) => print(&format!("{text}\n")),
-                Err(e) => {
-                    tell(&format!("error: {e}\n"));
-                    FAILED
-                }
+                Err(e) => render::refuse("E0731", e.to_string(), common.format),
             }
         }
         None => {

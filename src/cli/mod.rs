@@ -303,8 +303,8 @@ fn configured(mut cli: Cli, matches: &clap::ArgMatches) -> u8 {
         Some(n) => match rayon::ThreadPoolBuilder::new().num_threads(usize::from(n)).build() {
             Ok(pool) => pool.install(run),
             Err(e) => {
-                render::tell(&format!("error: cannot start {n} threads: {e}\n"));
-                commands::FAILED
+                let message = format!("cannot start {n} threads: {e}");
+                render::refuse("E0754", message, Format::Human)
             }
         },
     }
