@@ -143,7 +143,7 @@ async function check(file) {
     for (const id of ["view", "play", "time", "show", "colour"]) must(reached.has(id), `the tabulator does not reach ${id}`);
     const plots = await page.$$eval("svg[data-plot]", (all) => all.length);
     must(plots >= 1, "there are no plots");
-    await page.evaluate(() => { document.activeElement.blur(); scrollTo(0, 0); });
+    await page.evaluate(() => { document.activeElement.blur(); scrollTo({ top: 0, behavior: "instant" }); });
     await picture(page, `${name}-light`, true);
     await page.close();
 

@@ -365,7 +365,7 @@ function build(block) {
         const middle = new T.Vector3();
         [right, up, towards].forEach((axis, k) => middle.addScaledVector(axis, (ends[k][0] + ends[k][1]) / 2));
         // As near as all of it allows; above stand the buttons, below the scale.
-        const slope = Math.tan(camera.fov * Math.PI / 360), room = 1 - 84 / Math.max(stage.clientHeight, 200);
+        const slope = Math.tan(camera.fov * Math.PI / 360), room = 1 - (stage.clientWidth > 640 ? 84 : 40) / Math.max(stage.clientHeight, 200);
         let far = 0;
         for (const p of places) {
             const away = p.clone().sub(middle), depth = away.dot(towards);
