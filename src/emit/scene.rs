@@ -86,6 +86,16 @@ impl Frame {
     }
 }
 
+/// That something is an earlier one of the same kind, put elsewhere: instances of one design have their form and motion
+/// in common.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Twin {
+    /// Index of the earlier one.
+    pub of: usize,
+    /// From there to here.
+    pub put: Frame,
+}
+
 /// A rigid body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Link {
@@ -99,6 +109,8 @@ pub struct Link {
     pub center: Vector3<f64>,
     /// Where that point is and how the body is turned from the rest pose, a state each.
     pub states: Vec<Frame>,
+    /// An earlier link of the same form and motion.
+    pub twin: Option<Twin>,
 }
 
 /// A flexure: a section carried along stations. z of a station's frame runs along the centre line, x across the thin side.
@@ -120,6 +132,8 @@ pub struct Ribbon {
     pub peaks_mpa: Vec<[f64; SECTION_POINTS]>,
     /// Largest von Mises stress of each station in each state, MPa.
     pub stresses_mpa: Vec<Vec<f64>>,
+    /// An earlier flexure of the same form and motion.
+    pub twin: Option<Twin>,
 }
 
 /// A body of the conventional mechanism, as bars between its joints.
@@ -275,6 +289,7 @@ mod tests {
             rest,
             peaks_mpa: vec![std::array::from_fn(|k| k as f64); 5],
             stresses_mpa: vec![vec![31.0; 5]],
+            twin: None,
         }
     }
 

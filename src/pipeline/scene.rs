@@ -1,7 +1,7 @@
 //! From solved designs and their printed parts to the [`Scene`] that viewers show: every instance in its place.
 
 use super::joined::{Printed, Solid};
-use crate::emit::scene::{Bar, Frame, Ghost, Link, Mark, Outline, Ribbon, Scene, Trace};
+use crate::emit::scene::{Bar, Frame, Ghost, Link, Mark, Outline, Ribbon, Scene, Trace, Twin};
 use crate::equilibrium::{Cycle, Layout, Model};
 use crate::geometry::skeleton::spanning_tree;
 use crate::geometry::{FlexureSolid, parts_input};
@@ -144,6 +144,8 @@ pub fn scene(assembly: &Assembly, moving: &[Moving], solids: &[Solid], printed: 
         full_stress_mpa: full_stress(assembly, moving),
         ..Scene::default()
     };
+    let joined = |i: usize, b: usize| assembly.joined.iter().any(|j| j.members.contains(&(i, b)));
+    let (mut link_twins, mut ribbon_twins) = (Twins::new(assembly), Twins::new(assembly));
     for (part, printed) in printed.iter().enumerate() {
         for ((i, b), mesh) in &printed.links {
             let Some((instance, m)) = of(*i) else { continue };
@@ -154,12 +156,16 @@ pub fn scene(assembly: &Assembly, moving: &[Moving], solids: &[Solid], printed: 
                 mesh: mesh.clone(),
                 center: instance.placement.point(center),
                 states: frames(instance, &m.poses, *b, center),
+                // A body that several instances have in common has a form of its own.
+                twin: if joined(*i, *b) { None } else { link_twins.meet(*i, *b, out.links.len()) },
             });
         }
         for (i, f) in &printed.flexures {
             let Some((instance, m)) = of(*i) else { continue };
             let Some(solid) = solids.get(instance.design) else { continue };
-            out.ribbons.extend(ribbon(instance, m, solid, *f).map(|r| Ribbon { part, ..r }));
+            let Some(r) = ribbon(instance, m, solid, *f) else { continue };
+            let twin = ribbon_twins.meet(*i, *f, out.ribbons.len());
+            out.ribbons.push(Ribbon { part, twin, ..r });
         }
     }
     out.flat = flat(assembly, moving);
@@ -222,6 +228,39 @@ fn full_stress(assembly: &Assembly, moving: &[Moving]) -> f64 {
     stated.unwrap_or_else(|| peaks.fold(0.0, |m, s| m.max(*s)))
 }
 
+/// What instances of one design have in common: the first of each item, by design and index.
+struct Twins<'a> {
+    assembly: &'a Assembly,
+    /// Instance, item of the design, index in the scene.
+    first: Vec<(usize, usize, usize)>,
+}
+
+impl<'a> Twins<'a> {
+    fn new(assembly: &'a Assembly) -> Self {
+        Self { assembly, first: Vec::new() }
+    }
+
+    /// An item of an instance that will have this index: the earlier one that it is, if there is one. A mirror image is
+    /// none, nor is what goes through the states in another order.
+    fn meet(&mut self, instance: usize, item: usize, index: usize) -> Option<Twin> {
+        let own = self.assembly.instances.get(instance)?;
+        let (turn, shift) = (own.placement.matrix(), Vector3::from(own.placement.translation));
+        let same = self.first.iter().filter(|f| f.1 == item).find_map(|(i, _, of)| {
+            let other = self.assembly.instances.get(*i)?;
+            let like = other.design == own.design
+                && other.states == own.states
+                && other.placement.is_mirrored() == own.placement.is_mirrored();
+            let rotation = turn * other.placement.matrix().transpose();
+            let origin = shift - rotation * Vector3::from(other.placement.translation);
+            like.then_some(Twin { of: *of, put: Frame { origin, rotation } })
+        });
+        if same.is_none() {
+            self.first.push((instance, item, index));
+        }
+        same
+    }
+}
+
 /// What an instance has of a design's states, in its own order.
 fn ordered<'a, T>(instance: &'a Instance, states: &'a [T]) -> impl Iterator<Item = &'a T> {
     (0..states.len()).filter_map(|s| states.get(instance.state(s)))
@@ -260,6 +299,7 @@ fn ribbon(instance: &Instance, moving: &Moving, solid: &Solid, flexure: usize) -
         states: states.map(stations).collect(),
         peaks_mpa: peaks,
         stresses_mpa: ordered(instance, moving.stresses_mpa.get(flexure)?).cloned().collect(),
+        twin: None,
     })
 }
 

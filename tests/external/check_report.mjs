@@ -143,7 +143,7 @@ async function check(file) {
     for (const id of ["view", "play", "time", "show", "colour"]) must(reached.has(id), `the tabulator does not reach ${id}`);
     const plots = await page.$$eval("svg[data-plot]", (all) => all.length);
     must(plots >= 1, "there are no plots");
-    await page.evaluate(() => { document.activeElement.blur(); scrollTo(0, 0); });
+    await page.evaluate(() => { document.activeElement.blur(); scrollTo({ top: 0, behavior: "instant" }); });
     await picture(page, `${name}-light`, true);
     await page.close();
 
@@ -159,6 +159,15 @@ async function check(file) {
     await picture(page, `${name}-phone`, false);
     await page.evaluate(() => document.getElementById("requirements")?.scrollIntoView({ behavior: "instant" }));
     await picture(page, `${name}-phone-below`, false);
+    await page.close();
+
+    // Without WebGL there is the drawing, and everything else.
+    page = await browser.newPage();
+    await page.evaluateOnNewDocument(() => { HTMLCanvasElement.prototype.getContext = () => null; });
+    await page.goto(pathToFileURL(file).href);
+    await drawn(page, () => document.documentElement.dataset.ready === "yes");
+    const instead = await page.evaluate(() => ["drawing", "no3d", "view"].map((id) => document.getElementById(id).checkVisibility()));
+    must(instead.join() === "true,true,false", `without WebGL drawing, note and view are ${instead}`);
     await page.close();
     must(told.length === 0, told.join("\n         "));
     console.log(`  mechanism ${(100 * mechanism).toFixed(1)} % of the view, slider changes ${(100 * change).toFixed(1)} %, ${plots} plots, ready after ${opened} ms`);

@@ -5,7 +5,7 @@
 
 use super::Report;
 use crate::emit::normals::shaded;
-use crate::emit::scene::{Frame, Scene};
+use crate::emit::scene::{Frame, Scene, Twin};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
@@ -84,10 +84,8 @@ impl Block {
     fn turns(&mut self, rotations: impl Iterator<Item = Matrix3<f64>>) -> usize {
         let at = self.here();
         for r in rotations {
-            let q = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(r));
-            self.0.extend(
-                [q.i, q.j, q.k, q.w].iter().flat_map(|x| ((x * 32767.0).round() as i16).to_le_bytes()),
-            );
+            let q = quaternion(&r);
+            self.0.extend(q.iter().flat_map(|x| ((x * 32767.0).round() as i16).to_le_bytes()));
         }
         at
     }
@@ -115,6 +113,19 @@ fn place(v: &Vector3<f64>) -> Value {
     json!([short(v.x), short(v.y), short(v.z)])
 }
 
+/// Which earlier item something is, how it is turned and shifted from there.
+fn like(twin: &Twin) -> Value {
+    let q = quaternion(&twin.put.rotation);
+    let fine = |x: f64| json!((x * 1e7).round() / 1e7 + 0.0);
+    json!({"of": twin.of, "turn": q.map(fine), "shift": place(&twin.put.origin)})
+}
+
+/// x, y, z, w of unit length.
+fn quaternion(rotation: &Matrix3<f64>) -> [f64; 4] {
+    let q = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*rotation));
+    [q.i, q.j, q.k, q.w]
+}
+
 /// A stress as a part of the full one, 0 to 255.
 fn shade(scene: &Scene, stress_mpa: f64) -> u8 {
     let full = scene.full_stress_mpa;
@@ -128,6 +139,10 @@ pub fn pack(report: &Report<'_>) -> Result<(String, String), String> {
     let mut block = Block::default();
     let mut links = Vec::new();
     for link in &scene.links {
+        if let Some(twin) = &link.twin {
+            links.push(json!({"name": link.name, "part": link.part, "like": like(twin)}));
+            continue;
+        }
         let seen = shaded(&link.mesh);
         let local: Vec<Vector3<f64>> = seen.positions.iter().map(|p| p - link.center).collect();
         links.push(json!({
@@ -142,12 +157,17 @@ pub fn pack(report: &Report<'_>) -> Result<(String, String), String> {
     }
     let mut ribbons = Vec::new();
     for ribbon in &scene.ribbons {
+        if let Some(twin) = &ribbon.twin {
+            ribbons.push(json!({"name": ribbon.name, "part": ribbon.part, "like": like(twin)}));
+            continue;
+        }
         let surface = ribbon.surface();
         let stations = ribbon.rest.len();
         let frames: Vec<Frame> = ribbon.states.iter().flatten().copied().collect();
         let stresses = ribbon.stresses_mpa.iter().flatten();
         ribbons.push(json!({
             "name": ribbon.name,
+            "part": ribbon.part,
             "stations": stations,
             "v": block.positions(&surface.local),
             "n": block.directions(&surface.normals),

@@ -167,14 +167,41 @@ function build(block) {
     const looks = [0, 1, 2, 3, 4].map(() => new T.MeshStandardMaterial({ roughness: 0.72, metalness: 0 }));
     const solids = new T.Group(), ghosts = new T.Group(), lines = new T.Group();
     scene.add(solids, ghosts, lines);
+    /** The same object once more, elsewhere. */
+    const again = (mesh, like, look) => {
+        const place = new T.Group(), copy = new T.Mesh(mesh.geometry, look);
+        place.quaternion.fromArray(like.turn).normalize();
+        place.position.fromArray(like.shift);
+        copy.position.copy(mesh.position);
+        copy.frustumCulled = mesh.frustumCulled;
+        place.add(copy);
+        solids.add(place);
+        return copy;
+    };
+    /** A box that is put elsewhere, as one that holds it. */
+    const boxOf = (mesh, like) => {
+        const box = mesh.geometry.boundingBox.clone().translate(mesh.position);
+        if (!like) return box;
+        const place = new T.Matrix4().compose(point.fromArray(like.shift), turn.fromArray(like.turn).normalize(), new T.Vector3(1, 1, 1));
+        return box.applyMatrix4(place);
+    };
+    const linkMeshes = [], ribbonMeshes = [];
     for (const link of data.links) {
+        if (link.like) {
+            const first = linkMeshes[link.like.of], copy = again(first, link.like, looks[link.part % looks.length]);
+            linkMeshes.push(copy);
+            follow(copy, data.links[link.like.of].s);
+            bounds.union(boxOf(first, link.like));
+            continue;
+        }
         const v = positions(block, link.v), normals = new T.BufferAttribute(new Int8Array(block, link.n, v.length), 3, true);
         const mesh = new T.Mesh(geometry(v, normals, corners(block, link.i)), looks[link.part % looks.length]);
         mesh.position.fromArray(link.center);
         solids.add(mesh);
         follow(mesh, link.s);
         mesh.geometry.computeBoundingBox();
-        bounds.union(mesh.geometry.boundingBox.clone().translate(mesh.position));
+        linkMeshes.push(mesh);
+        bounds.union(boxOf(mesh));
     }
 
     // Flexures: each vertex rides with a station, as the sections of a rod do.
@@ -183,6 +210,11 @@ function build(block) {
     const recolour = [];
     let colouring = "now";
     for (const ribbon of data.ribbons) {
+        if (ribbon.like) {
+            // Its vertices are those of the first, which move already.
+            ribbonMeshes.push(again(ribbonMeshes[ribbon.like.of], ribbon.like, flexureLook));
+            continue;
+        }
         const local = positions(block, ribbon.v), count = local.length / 3;
         const normal = new Int8Array(block, ribbon.n, 3 * count), at = new Uint8Array(block, ribbon.at, count);
         const peak = new Uint8Array(block, ribbon.peak, count);
@@ -196,7 +228,7 @@ function build(block) {
         const mesh = new T.Mesh(g, flexureLook);
         mesh.frustumCulled = false;
         solids.add(mesh);
-        const part = data.links.find((l) => l.part === ribbon.part);
+        ribbonMeshes.push(mesh);
         movers.push((t) => {
             const a = Math.min(Math.floor(t), states - 1), b = Math.min(a + 1, states - 1), u = t - a;
             for (let k = 0; k < count; k++) {
@@ -331,7 +363,8 @@ function build(block) {
     if (data.flat && Math.abs(data.flat[2]) > 0.9) from.iso = [0.28, 0.3, 1];
     // Where something is at some time: what a view has to hold.
     const places = [];
-    for (const link of data.links) {
+    for (const each of data.links) {
+        const link = each.like ? data.links[each.like.of] : each;
         const all = positions(block, link.v), { p, q } = frames(block, link.s), states = p.length / 3;
         if (!states || !all.length) continue;
         const low = [Infinity, Infinity, Infinity], high = low.map((x) => -x);
@@ -343,7 +376,9 @@ function build(block) {
             turn.fromArray(q, 4 * a).normalize();
             for (let c = 0; c < 8; c++) {
                 const corner = new T.Vector3(c & 1 ? high[0] : low[0], c & 2 ? high[1] : low[1], c & 4 ? high[2] : low[2]);
-                places.push(corner.applyQuaternion(turn).add(point.fromArray(p, 3 * a)));
+                corner.applyQuaternion(turn).add(point.fromArray(p, 3 * a));
+                if (each.like) corner.applyQuaternion(other.fromArray(each.like.turn).normalize()).add(point.fromArray(each.like.shift));
+                places.push(corner);
             }
         }
     }
@@ -365,7 +400,7 @@ function build(block) {
         const middle = new T.Vector3();
         [right, up, towards].forEach((axis, k) => middle.addScaledVector(axis, (ends[k][0] + ends[k][1]) / 2));
         // As near as all of it allows; above stand the buttons, below the scale.
-        const slope = Math.tan(camera.fov * Math.PI / 360), room = 1 - 84 / Math.max(stage.clientHeight, 200);
+        const slope = Math.tan(camera.fov * Math.PI / 360), room = 1 - (stage.clientWidth > 640 ? 84 : 40) / Math.max(stage.clientHeight, 200);
         let far = 0;
         for (const p of places) {
             const away = p.clone().sub(middle), depth = away.dot(towards);
@@ -442,6 +477,7 @@ function build(block) {
     followers.push((at) => { movers.forEach((f) => f(at)); draw(); });
     // A cycle is closed where all bodies end as they begin.
     closed = data.links.every((l) => {
+        if (l.like) return true;
         const { p } = frames(block, l.s), n = p.length - 3;
         return n <= 0 || Math.hypot(p[n] - p[0], p[n + 1] - p[1], p[n + 2] - p[2]) < 1e-3 * size;
     });
@@ -455,6 +491,9 @@ function build(block) {
 }
 
 async function main() {
+    // Read out when asked for, not at every step of the motion.
+    document.querySelectorAll("output").forEach((o) => o.setAttribute("aria-live", "off"));
+    addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));
     byId("run").hidden = last < 1;
     byId("key").hidden = false;
     try {
