@@ -90,30 +90,6 @@ impl Field {
             .sum()
     }
 
-    /// Indices of the six neighbours of a node.
-    pub(super) fn neighbours(&self, i: usize) -> impl Iterator<Item = usize> + use<> {
-        let [nx, ny, nz] = self.count;
-        let (x, y, z) = (i % nx, i / nx % ny, i / (nx * ny));
-        [
-            (x > 0).then(|| i - 1),
-            (x + 1 < nx).then_some(i + 1),
-            (y > 0).then(|| i - nx),
-            (y + 1 < ny).then_some(i + nx),
-            (z > 0).then(|| i - nx * ny),
-            (z + 1 < nz).then_some(i + nx * ny),
-        ]
-        .into_iter()
-        .flatten()
-    }
-
-    /// The node nearest to a point.
-    pub(super) fn nearest(&self, p: &Vector3<f64>) -> usize {
-        let q = (p - self.origin) / self.step;
-        let at: Vec<usize> =
-            (0..3).map(|k| (q[k].round().max(0.0) as usize).min(self.count[k] - 1)).collect();
-        (at[2] * self.count[1] + at[1]) * self.count[0] + at[0]
-    }
-
     /// The closed surface where the field is zero; nothing touches the border of the grid.
     pub(super) fn surface(&self) -> Mesh {
         let [nx, ny, nz] = self.count;

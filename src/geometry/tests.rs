@@ -343,6 +343,13 @@ fn the_least_wall_of_a_notched_bar() {
         // Beyond 2 mm, where the notch's own field ends, it is only known to be as thick.
         let right = |w: f64| (w - left.min(2.2)).abs() < 0.3;
         assert!(matches!(wall, Wall::Least(w) if right(w)), "{left}: {wall:?}");
+        // What else the body reaches, as a palm on a frame of a whole hand, makes its walls no harder to see.
+        let mut large = plan.clone();
+        let far = v(-150.0, 300.0, 250.0);
+        large.slots.push((Role::Bar, Slot::capsule(v(0.0, 0.0, 0.0), far, 4.0)));
+        large.slots.push((Role::Boss, Slot::capsule(far, far, 4.5)));
+        let wall = least_wall(&large, &[(0, &notch)]);
+        assert!(matches!(wall, Wall::Least(w) if right(w)), "{left}: {wall:?} in a large body");
     }
     let mut through = Field::new(&v(10.0, -8.0, -8.0), &v(30.0, 8.0, 8.0), 0.6, 1.0);
     for up in -7..8 {
