@@ -30,6 +30,7 @@ impl Builder {
             rods: Vec::new(),
             drives: Vec::new(),
             loads: Vec::new(),
+            cases: Vec::new(),
             strings: Vec::new(),
             cycle: Cycle { steps: 60, duration_s: 2.0, origin: origin(9, 0) },
             traces: Vec::new(),
@@ -72,6 +73,7 @@ impl Builder {
             skeleton,
             layer,
             owner: None,
+            holes: Vec::new(),
             printed: None,
             origin,
         });

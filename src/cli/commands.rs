@@ -38,10 +38,7 @@ pub fn ir(common: &Common) -> u8 {
             };
             match text {
                 Ok(text) => print(&format!("{text}\n")),
-                Err(e) => {
-                    tell(&format!("error: {e}\n"));
-                    FAILED
-                }
+                Err(e) => render::refuse("E0731", e.to_string(), common.format),
             }
         }
         None => {
@@ -60,6 +57,7 @@ pub fn simulate(arguments: &Simulate) -> u8 {
     };
     opened.request.fresh = arguments.fresh;
     opened.request.frozen = arguments.frozen;
+    opened.request.case.clone_from(&arguments.case);
     if let Err(why) = opened.read_lock(common, &arguments.out) {
         return unreadable(common, &why);
     }

@@ -14,12 +14,10 @@ use super::{Build, Cli, Command, Common, Optimizer};
 use clap::ArgMatches;
 use clap::parser::ValueSource;
 use flexura::diagnostic::{Diagnostic, Origin, Severity, SourceMap};
+use flexura::lint::config::NAME;
 use flexura::pipeline::placeless;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-
-/// Name of the file.
-pub const NAME: &str = "flexura.toml";
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -113,18 +111,14 @@ fn read(source: &Path) -> Result<Option<(Config, PathBuf)>, Faults> {
     let Some(folder) = source.canonicalize().ok().and_then(|p| p.parent().map(Path::to_path_buf)) else {
         return Ok(None);
     };
-    let Some(path) = nearest(&folder) else { return Ok(None) };
     let mut sources = SourceMap::default();
-    let text = match read_text(&path) {
-        Ok(text) => text,
-        Err(why) => {
-            let message = format!("cannot read `{}`: {why}", path.display());
-            return Err((vec![placeless(Severity::Error, "E0730", message)], sources));
-        }
+    let Found { folder, text, file } = match found(&folder, &mut sources) {
+        Ok(Some(found)) => found,
+        Ok(None) => return Ok(None),
+        Err(why) => return Err((vec![why], sources)),
     };
-    let file = sources.add(path.display().to_string(), text.clone());
     match toml::from_str(&text) {
-        Ok(config) => Ok(Some((config, path.parent().map(Path::to_path_buf).unwrap_or_default()))),
+        Ok(config) => Ok(Some((config, folder))),
         Err(e) => {
             let place = e.span().unwrap_or(0..0);
             let at = Origin { file, start: place.start as u32, end: place.end as u32 };
@@ -135,9 +129,50 @@ fn read(source: &Path) -> Result<Option<(Config, PathBuf)>, Faults> {
     }
 }
 
-/// Beside the source, or above it up to the repository's folder.
-fn nearest(folder: &Path) -> Option<PathBuf> {
+/// A configuration's text, its index in the source map, and its folder.
+pub struct Found {
+    /// Where it stands.
+    pub folder: PathBuf,
+    /// What it says.
+    pub text: String,
+    /// Its index.
+    pub file: u32,
+}
+
+/// The configuration that counts for designs in a folder: beside them, or above up to the repository's folder.
+///
+/// # Errors
+/// E0730 where it cannot be read.
+pub fn found(folder: &Path, sources: &mut SourceMap) -> Result<Option<Found>, Diagnostic> {
     let top = folder.ancestors().find(|a| a.join(".git").exists()).unwrap_or(folder);
     let within = folder.ancestors().take_while(|a| a.starts_with(top));
-    within.map(|a| a.join(NAME)).find(|p| p.is_file())
+    let Some(folder) = within.into_iter().find(|a| a.join(NAME).is_file()) else { return Ok(None) };
+    let path = folder.join(NAME);
+    let text = read_text(&path).map_err(|why| {
+        placeless(Severity::Error, "E0730", format!("cannot read `{}`: {why}", path.display()))
+    })?;
+    let file = sources.add(path.display().to_string(), text.clone());
+    Ok(Some(Found { folder: folder.to_path_buf(), text, file }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_configuration_of_the_repository_counts() {
+        let outer = tempfile::tempdir().unwrap();
+        let inner = outer.path().join("repository/designs/leg");
+        let counts = || found(&inner, &mut SourceMap::default()).unwrap().map(|f| f.folder);
+        std::fs::create_dir_all(&inner).unwrap();
+        std::fs::write(outer.path().join(NAME), "").unwrap();
+        assert_eq!(counts(), None, "without a repository only beside the source");
+        std::fs::create_dir(outer.path().join("repository/.git")).unwrap();
+        assert_eq!(counts(), None, "not above the repository");
+        let shared = outer.path().join("repository");
+        std::fs::write(shared.join(NAME), "").unwrap();
+        assert_eq!(counts(), Some(shared));
+        std::fs::write(inner.join(NAME), "").unwrap();
+        assert_eq!(counts(), Some(inner.clone()));
+    }
 }

@@ -1,11 +1,12 @@
 //! `flexura doc`: the standard library and files of one's own by their doc comments.
 
+use super::Format;
 use super::artefacts::write_below;
 use super::commands::{FAILED, FINE, print};
-use super::render::{self, tell};
+use super::render;
 use super::sources::read_text;
 use super::style::Style;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use flexura::diagnostic::{Diagnostic, Severity, SourceMap};
 use flexura::doc::text::{Paper, Tone};
 use flexura::doc::{Page, html, library};
@@ -34,23 +35,16 @@ pub struct Doc {
     format: Format,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// For people
-    Human,
-    /// For scripts: the pages as one JSON object
-    Json,
-}
-
 /// Runs it.
 pub fn run(arguments: &Doc) -> u8 {
+    super::sarif::refuse(arguments.format);
     let library = library();
     let mut found: Vec<Page> = Vec::new();
     for wanted in &arguments.pages {
         match pages(wanted, &library) {
             Ok(pages) => found.extend(pages),
             Err(diagnostic) => {
-                render::show(&[*diagnostic], &SourceMap::default());
+                render::report(&[*diagnostic], &SourceMap::default(), arguments.format);
                 return FAILED;
             }
         }
@@ -125,7 +119,7 @@ fn site(pages: Vec<Page>, folder: &Path) -> u8 {
     let files = match html::site(&pages) {
         Ok(files) => files,
         Err(e) => {
-            tell(&format!("error: {e}\n"));
+            render::show(&[placeless(Severity::Error, "E0731", e.to_string())], &SourceMap::default());
             return FAILED;
         }
     };

@@ -1,10 +1,11 @@
 //! `flexura explain`.
 
 use super::commands::{FAILED, print};
-use super::render::tell;
-use super::{Format, style::Style};
+use super::{Format, render, style::Style};
 use clap::Args;
+use flexura::diagnostic::{Diagnostic, Severity, SourceMap};
 use flexura::lint::explain;
+use flexura::pipeline::placeless;
 use serde_json::json;
 
 /// Arguments of `explain`.
@@ -39,11 +40,21 @@ pub fn explain(arguments: &Explain) -> u8 {
         }
         (Some(one), Format::Json | Format::Sarif) => print(&format!("{}\n", json!(one))),
         (None, _) => {
-            let near = explain::nearest(word).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
-            tell(&format!("error: there is no code `{word}`{near}\n`flexura explain --list` shows all\n"));
+            render::report(&[unknown(word)], &SourceMap::default(), arguments.format);
             FAILED
         }
     }
+}
+
+/// A code or name that is none.
+fn unknown(word: &str) -> Diagnostic {
+    let near: Vec<String> = explain::nearest(word).into_iter().map(|n| format!("`{n}`")).collect();
+    placeless(Severity::Error, "E0764", format!("there is no code or rule `{word}`")).help(
+        match near.as_slice() {
+            [] => "`flexura explain --list` shows all".into(),
+            near => format!("did you mean {}? `flexura explain --list` shows all", near.join(" or ")),
+        },
+    )
 }
 
 /// A page for the terminal: headings bold, samples indented, fences left out.

@@ -88,7 +88,34 @@ fn repeated(out: &BuildOutcome, name: &str) -> bool {
 fn measures(text: &mut String, out: &BuildOutcome, style: Style) {
     let (before, after) = (out.before.as_ref(), out.after.as_ref());
     let Some(result) = after.or(before) else { return };
-    let mut rows: Vec<(String, Option<f64>, Option<f64>, &str)> = Vec::new();
+    let mut rows = of_cycle(out, before, after);
+    for name in result.cases.keys() {
+        let of = |m: Option<&'_ Measures>| m.and_then(|m| m.cases.get(name)).cloned();
+        let under = of_cycle(out, of(before).as_ref(), of(after).as_ref());
+        rows.extend(under.into_iter().map(|(what, b, a, unit)| (format!("case {name}: {what}"), b, a, unit)));
+    }
+    // What cannot be compared, as the error of a trace without a target, is left out.
+    rows.retain(|(_, b, a, _)| [b, a].iter().any(|v| v.is_some_and(f64::is_finite)));
+    let width = rows.iter().map(|r| r.0.chars().count()).max().unwrap_or(0).max(16);
+    let heading = format!("{:width$}  {:>10}  {:>10}", "", "before", "after");
+    let _ = writeln!(text, "\n{}", style.dim(&heading));
+    for (name, b, a, unit) in rows {
+        let _ = writeln!(
+            text,
+            "{name:width$}  {:>10}  {}  {unit}",
+            number(b),
+            style.bold(&format!("{:>10}", number(a)))
+        );
+    }
+}
+
+/// A line of the table: name, before, after, unit.
+type Row = (String, Option<f64>, Option<f64>, &'static str);
+
+/// What is measured over a cycle.
+fn of_cycle(out: &BuildOutcome, before: Option<&Measures>, after: Option<&Measures>) -> Vec<Row> {
+    let Some(result) = after.or(before) else { return Vec::new() };
+    let mut rows: Vec<Row> = Vec::new();
     for name in result.traces.keys().filter(|n| !repeated(out, n)) {
         let of = |m: Option<&Measures>| m.and_then(|m| m.traces.get(name)).cloned();
         let (b, a) = (of(before), of(after));
@@ -122,19 +149,7 @@ fn measures(text: &mut String, out: &BuildOutcome, style: Style) {
     if gap(before).or(gap(after)).is_some() {
         rows.push(("least gap".into(), gap(before), gap(after), "mm"));
     }
-    // What cannot be compared, as the error of a trace without a target, is left out.
-    rows.retain(|(_, b, a, _)| [b, a].iter().any(|v| v.is_some_and(f64::is_finite)));
-    let width = rows.iter().map(|r| r.0.chars().count()).max().unwrap_or(0).max(16);
-    let heading = format!("{:width$}  {:>10}  {:>10}", "", "before", "after");
-    let _ = writeln!(text, "\n{}", style.dim(&heading));
-    for (name, b, a, unit) in rows {
-        let _ = writeln!(
-            text,
-            "{name:width$}  {:>10}  {}  {unit}",
-            number(b),
-            style.bold(&format!("{:>10}", number(a)))
-        );
-    }
+    rows
 }
 
 fn requirements(text: &mut String, out: &BuildOutcome, style: Style) {

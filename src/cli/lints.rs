@@ -43,11 +43,13 @@ impl LintFlags {
         for (selectors, level) in all {
             levels.flags.extend(selectors.iter().map(|s| (s.clone(), level)));
         }
-        if let Some(path) = configuration(folder) {
-            match read(&path, &mut sources).and_then(|(text, file)| config::parse(&text, file)) {
+        match super::config::found(folder, &mut sources) {
+            Ok(None) => {}
+            Ok(Some(own)) => match config::parse(&own.text, own.file) {
                 Ok(config) => levels.config = config,
                 Err(why) => found.extend(why),
-            }
+            },
+            Err(why) => found.push(why),
         }
         if let Some(path) = &self.baseline {
             match read(path, &mut sources).and_then(|(text, file)| Baseline::parse(&text, file)) {
@@ -59,13 +61,6 @@ impl LintFlags {
     }
 }
 
-/// The nearest configuration: beside the source, or in a folder above it up to that of the repository.
-fn configuration(folder: &Path) -> Option<PathBuf> {
-    let top = folder.ancestors().find(|a| a.join(".git").exists()).unwrap_or(folder);
-    let within = folder.ancestors().take_while(|a| a.starts_with(top));
-    within.map(|a| a.join(config::NAME)).find(|p| p.is_file())
-}
-
 fn read(path: &Path, sources: &mut SourceMap) -> Result<(String, u32), Vec<Diagnostic>> {
     let unread = |why: FileError| {
         let message = format!("cannot read `{}`: {why}", path.display());
@@ -74,26 +69,4 @@ fn read(path: &Path, sources: &mut SourceMap) -> Result<(String, u32), Vec<Diagn
     let text = read_text(path).map_err(unread)?;
     let file = sources.add(path.display().to_string(), text.clone());
     Ok((text, file))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_nearest_configuration_of_the_repository_counts() {
-        let outer = tempfile::tempdir().unwrap();
-        let inner = outer.path().join("repository/designs/leg");
-        std::fs::create_dir_all(&inner).unwrap();
-        std::fs::write(outer.path().join(config::NAME), "").unwrap();
-        assert_eq!(configuration(&inner), None, "without a repository only beside the source");
-        std::fs::create_dir(outer.path().join("repository/.git")).unwrap();
-        assert_eq!(configuration(&inner), None, "not above the repository");
-        let shared = outer.path().join("repository").join(config::NAME);
-        std::fs::write(&shared, "").unwrap();
-        assert_eq!(configuration(&inner), Some(shared));
-        let own = inner.join(config::NAME);
-        std::fs::write(&own, "").unwrap();
-        assert_eq!(configuration(&inner), Some(own));
-    }
 }

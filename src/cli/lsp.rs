@@ -1,8 +1,9 @@
 //! `flexura lsp`: the language server on the standard input and output, with the disk behind it.
 
+use super::Format;
 use super::artefacts::write_below;
-use super::commands::{FAILED, FINE};
-use super::render::tell;
+use super::commands::FINE;
+use super::render::refuse;
 use super::sources::Folder;
 use clap::Args;
 use flexura::elaborate::{FileError, std_source};
@@ -23,14 +24,8 @@ pub fn lsp(_: &Lsp) -> u8 {
     let joined = threads.join();
     match (served, joined) {
         (Ok(()), Ok(())) => FINE,
-        (Err(why), _) => {
-            tell(&format!("error: {why}\n"));
-            FAILED
-        }
-        (_, Err(why)) => {
-            tell(&format!("error: {why}\n"));
-            FAILED
-        }
+        (Err(why), _) => refuse("E0755", why.to_string(), Format::Human),
+        (_, Err(why)) => refuse("E0755", why.to_string(), Format::Human),
     }
 }
 

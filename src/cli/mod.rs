@@ -5,6 +5,7 @@ mod artefacts;
 mod check;
 mod commands;
 mod config;
+mod coupon;
 mod diff;
 mod doc;
 mod explain;
@@ -95,6 +96,11 @@ enum Command {
     Completions(shells::Completions),
     /// Print the manual pages
     Man(shells::Man),
+    /// Find out how stiff a material really is: a test piece to print, and what its readings give
+    #[command(
+        after_help = "Examples:\n  flexura coupon pla\n  flexura coupon pla --measured coupon/measured.csv\n  flexura coupon pa12_mjf --on mjf"
+    )]
+    Coupon(coupon::Arguments),
     /// Speak with an editor: the language server, on the standard input and output
     Lsp(lsp::Lsp),
 }
@@ -203,6 +209,9 @@ struct Simulate {
     /// The conventional mechanism's motion
     #[arg(long)]
     rigid: bool,
+    /// Under the load case of this name
+    #[arg(long, value_name = "NAME", value_parser = word)]
+    case: Option<String>,
     /// Add the pose of every moving body: translation t (mm) and rotation vector (rad) from the rest pose
     ///
     /// A point of the body that lies at X in the rest pose lies at x = t + R X, with R the rotation by the
@@ -281,6 +290,7 @@ fn configured(mut cli: Cli, matches: &clap::ArgMatches) -> u8 {
         Command::Test(arguments) => test::run(arguments),
         Command::Fmt(arguments) => fmt::fmt(arguments),
         Command::New(arguments) => new::run(arguments),
+        Command::Coupon(arguments) => coupon::run(arguments),
         Command::Doc(arguments) => doc::run(arguments),
         Command::Diff(arguments) => diff::run(arguments),
         Command::Explain(arguments) => explain::explain(arguments),
@@ -293,8 +303,8 @@ fn configured(mut cli: Cli, matches: &clap::ArgMatches) -> u8 {
         Some(n) => match rayon::ThreadPoolBuilder::new().num_threads(usize::from(n)).build() {
             Ok(pool) => pool.install(run),
             Err(e) => {
-                render::tell(&format!("error: cannot start {n} threads: {e}\n"));
-                commands::FAILED
+                let message = format!("cannot start {n} threads: {e}");
+                render::refuse("E0754", message, Format::Human)
             }
         },
     }

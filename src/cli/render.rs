@@ -5,6 +5,7 @@ use super::manners::Manners;
 use super::style::Style;
 use flexura::diagnostic::json::{JsonDiagnostic, diagnostics};
 use flexura::diagnostic::{Diagnostic, Severity, SourceMap, terminal};
+use flexura::pipeline::placeless;
 use serde_json::json;
 use std::io::Write;
 
@@ -39,6 +40,12 @@ pub fn report(found: &[Diagnostic], sources: &SourceMap, format: Format) {
             super::sarif::print(found, sources);
         }
     }
+}
+
+/// Tells an error of the command itself, without a place in any file; its exit code.
+pub fn refuse(code: &str, message: String, format: Format) -> u8 {
+    report(&[placeless(Severity::Error, code, message)], &SourceMap::default(), format);
+    super::commands::FAILED
 }
 
 /// How many errors and warnings there are, e.g. `2 errors, 1 warning`; empty if there are none.

@@ -2,7 +2,7 @@
 
 use super::commands::{FAILED, FINE, Opened, open, print};
 use super::progress::Silent;
-use super::render::{self, tell};
+use super::render;
 use super::style::Style;
 use super::{Common, Format, junit};
 use clap::{Args, ValueEnum};
@@ -155,8 +155,7 @@ pub fn run(arguments: &Test) -> u8 {
         Report::Junit => match junit::report(&tested) {
             Ok(text) => print(&text),
             Err(e) => {
-                tell(&format!("error: no report can be written: {e}\n"));
-                FAILED
+                super::render::refuse("E0731", format!("no report can be written: {e}"), super::Format::Human)
             }
         },
     };

@@ -1,7 +1,7 @@
 //! What the mechanism does, before and after: errors, loads, stress, gap, volume and requirements.
 
 use super::numbers::all_renamed;
-use crate::pipeline::Examined;
+use crate::pipeline::{Examined, Measures};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -63,31 +63,11 @@ pub fn compare(before: &Examined, after: &Examined, renames: &BTreeMap<String, S
 /// Measures of one version, as `after`.
 fn measures(version: &Examined) -> Vec<Row> {
     let Some(m) = &version.outcome.after else { return Vec::new() };
-    let mut rows = Vec::new();
-    let mut row = |name: String, value: f64, unit: &str| {
-        // What cannot be compared, as the error of a trace without a target, is no number.
-        if value.is_finite() {
-            rows.push(Row { name, unit: unit.into(), before: None, after: Some(value), holds: None });
-        }
-    };
-    for (name, t) in &m.traces {
-        row(format!("{name}, mean error"), t.mean_error_mm, "mm");
-        row(format!("{name}, largest error"), t.max_error_mm, "mm");
+    let mut rows = of_cycle(m, "");
+    for (case, under) in &m.cases {
+        rows.extend(of_cycle(under, &format!("case {case}: ")));
     }
-    for (name, d) in &m.directions {
-        row(format!("{name}, mean error"), d.mean_error_deg, "deg");
-        row(format!("{name}, largest error"), d.max_error_deg, "deg");
-    }
-    for (name, o) in &m.outputs {
-        row(format!("{name}, span"), o.span_deg, "deg");
-    }
-    for (name, drive) in &m.drives {
-        let (what, value, unit) = drive.parts();
-        row(format!("{name}, {what}"), value, unit);
-    }
-    row("largest stress".into(), m.stress.max_mpa.unwrap_or(f64::NAN), "MPa");
-    row("least gap".into(), m.gap.least_mm.unwrap_or(f64::NAN), "mm");
-    row("volume".into(), version.volume_mm3.map_or(f64::NAN, |v| v / 1e3), "cm³");
+    rows.extend(row("volume".into(), version.volume_mm3.map_or(f64::NAN, |v| v / 1e3), "cm³"));
     for r in &version.outcome.requirements {
         rows.push(Row {
             name: query(&r.text).to_string(),
@@ -97,6 +77,35 @@ fn measures(version: &Examined) -> Vec<Row> {
             holds: Some([None, Some(r.pass)]),
         });
     }
+    rows
+}
+
+/// A measure, if it is a number: what cannot be compared, as the error of a trace without a target, is none.
+fn row(name: String, value: f64, unit: &str) -> Option<Row> {
+    let row = Row { name, unit: unit.into(), before: None, after: Some(value), holds: None };
+    value.is_finite().then_some(row)
+}
+
+/// What is measured over a cycle; `of` says under which case.
+fn of_cycle(m: &Measures, of: &str) -> Vec<Row> {
+    let mut rows = Vec::new();
+    for (name, t) in &m.traces {
+        rows.extend(row(format!("{of}{name}, mean error"), t.mean_error_mm, "mm"));
+        rows.extend(row(format!("{of}{name}, largest error"), t.max_error_mm, "mm"));
+    }
+    for (name, d) in &m.directions {
+        rows.extend(row(format!("{of}{name}, mean error"), d.mean_error_deg, "deg"));
+        rows.extend(row(format!("{of}{name}, largest error"), d.max_error_deg, "deg"));
+    }
+    for (name, o) in &m.outputs {
+        rows.extend(row(format!("{of}{name}, span"), o.span_deg, "deg"));
+    }
+    for (name, drive) in &m.drives {
+        let (what, value, unit) = drive.parts();
+        rows.extend(row(format!("{of}{name}, {what}"), value, unit));
+    }
+    rows.extend(row(format!("{of}largest stress"), m.stress.max_mpa.unwrap_or(f64::NAN), "MPa"));
+    rows.extend(row(format!("{of}least gap"), m.gap.least_mm.unwrap_or(f64::NAN), "mm"));
     rows
 }
 

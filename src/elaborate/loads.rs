@@ -16,8 +16,7 @@ const PARALLEL: f64 = 1e-9;
 const DIRECTION_HELP: &str = "write `(0, 0, -1)`, or `x`, `y`, `z`";
 
 impl<'a> Evaluator<'a> {
-    /// All loads. `weightless` is the name of the material if it states no density. Also notes whether anything is
-    /// driven, which terms and queries ask for.
+    /// The loads of a mechanism or of one of its cases. `weightless` is the name of the material if it states no density.
     pub(super) fn loads(
         &mut self,
         scope: usize,
@@ -25,7 +24,6 @@ impl<'a> Evaluator<'a> {
         s: &Structure<'a>,
         weightless: Option<&str>,
     ) -> Outcome<Vec<Load>> {
-        self.undriven = sheet.drives.is_empty() && !sheet.loads.is_empty() && !sheet.broken && !sheet.later;
         self.limit(sheet.loads.len(), "loads", sheet.loads.first().map(|l| l.1).unwrap_or_default())?;
         let mut out = Vec::new();
         let mut ok = Ok(());

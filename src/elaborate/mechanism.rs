@@ -62,11 +62,14 @@ impl<'a> Evaluator<'a> {
             Some(_) => self.cycle(scope, &sheet, outside.steps).ok(),
             None => self.missing(&sheet, m, "cycle", "`cycle 60 steps over 2 s`"),
         };
-        if sheet.drives.is_empty() && sheet.loads.is_empty() {
+        let loaded = !sheet.loads.is_empty() || sheet.cases.iter().any(|(_, c, _)| !c.loads.is_empty());
+        if sheet.drives.is_empty() && !loaded {
             let _: Option<()> = self.missing(&sheet, m, "drive or load", "`drive J from 0 deg to 360 deg`");
         }
         let drives = self.drives(scope, module, &sheet, &s).ok();
         let weightless = material.as_ref().filter(|m| m.density_g_mm3.is_none()).map(|m| m.name.as_str());
+        // Terms and queries ask for it.
+        self.undriven = sheet.drives.is_empty() && loaded && !sheet.broken && !sheet.later;
         let loads = self.loads(scope, &sheet, &s, weightless).ok();
         let mut traces = Vec::new();
         let mut trace_index = BTreeMap::new();
@@ -82,15 +85,8 @@ impl<'a> Evaluator<'a> {
         let named = Named { traces: &trace_index, driven: &driven, drives: drives.as_deref() };
         // Goals do not grow with the drawing.
         self.as_is = true;
-        let mut objectives = Vec::new();
-        for term in sheet.minimize.map(|(terms, _)| terms).unwrap_or_default() {
-            objectives.extend(self.objective(scope, term, &named));
-        }
-        let mut requirements = Vec::new();
-        for text in &sheet.requires {
-            let line = quote(outside.sources, text.at);
-            requirements.extend(self.requirement(scope, text, &trace_index, &driven, &line));
-        }
+        let (objectives, requirements) = self.goals(scope, &sheet, &named, outside);
+        let cases = self.cases(scope, &sheet, &s, &named, weightless, outside);
         let mut exports = Vec::new();
         for e in &sheet.exports {
             exports.extend(self.export(scope, e, &driven, &sheet.drives));
@@ -110,6 +106,7 @@ impl<'a> Evaluator<'a> {
             drives: drives?,
             strings: strings.map(|()| s.strings).ok()?,
             loads: loads?,
+            cases,
             cycle: cycle?,
             traces,
             aims: std::mem::take(&mut self.aims.made),
@@ -255,6 +252,7 @@ pub(super) fn quote(sources: &SourceMap, at: Origin) -> String {
 fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
     for b in &mut design.bodies {
         b.skeleton.iter_mut().flat_map(|p| &mut p.position).for_each(&mut *f);
+        b.holes.iter_mut().flat_map(|h| &mut h.position).for_each(&mut *f);
     }
     for j in &mut design.joints {
         j.point.iter_mut().for_each(&mut *f);
@@ -282,7 +280,7 @@ fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
     for c in &mut design.strings {
         c.point.iter_mut().chain(c.via.iter_mut().flatten()).for_each(&mut *f);
     }
-    for load in &mut design.loads {
+    for load in design.loads.iter_mut().chain(design.cases.iter_mut().flat_map(|c| &mut c.loads)) {
         if let LoadKind::Force { point, .. } = &mut load.kind {
             point.iter_mut().for_each(&mut *f);
         }

@@ -295,7 +295,7 @@ fn same_states(design: &Design, source: &Instance, images: &[Image]) -> Option<V
     let at = |d: &Drive, s: usize| d.value(s as f64 / n as f64);
     let values: Vec<Vec<f64>> = (0..=n).map(|s| drives.iter().map(|(d, _)| at(d, s)).collect()).collect();
     // Loads keep their time: their sizes must agree too.
-    let sizes = |s: usize| design.loads.iter().map(move |l| l.size(s as f64 / n as f64));
+    let sizes = |s: usize| design.all_loads().map(move |l| l.size(s as f64 / n as f64));
     let alike = |s: usize, k: usize| {
         sizes(s).zip(sizes(k)).all(|(a, b)| (a - b).abs() <= SAME * a.abs().max(b.abs()))
     };

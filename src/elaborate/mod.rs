@@ -6,6 +6,7 @@
 mod aims;
 mod arithmetic;
 mod assertions;
+mod cases;
 mod check;
 pub mod codes;
 pub mod dimension;
@@ -18,6 +19,7 @@ mod functions;
 mod given;
 mod goals;
 mod graph;
+mod holes;
 mod instances;
 mod known;
 mod load;

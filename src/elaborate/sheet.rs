@@ -54,6 +54,7 @@ pub struct Sheet<'a> {
     pub drives: Vec<DriveText<'a>>,
     pub strings: Vec<(&'a ast::Cable, Origin)>,
     pub loads: Vec<(&'a ast::Load, Origin)>,
+    pub holes: Vec<(&'a ast::Hole, Origin)>,
     pub rests: Vec<(&'a Ident, &'a Expr, Origin)>,
     pub traces: Vec<TraceText<'a>>,
     /// Traced directions.
@@ -65,6 +66,8 @@ pub struct Sheet<'a> {
     pub requires: Vec<RequireText<'a>>,
     pub exports: Vec<&'a Expr>,
     pub asserts: Vec<(&'a ast::Assert, Origin)>,
+    /// Load cases: what stands in each.
+    pub cases: Vec<(&'a Ident, Sheet<'a>, Origin)>,
     pub places: Vec<(&'a ast::Place, Origin)>,
     pub mirrors: Vec<(&'a ast::Mirror, Origin)>,
     /// Something could not be understood: what seems missing may be there.
@@ -177,6 +180,7 @@ impl<'a> Evaluator<'a> {
                 }
             }
             StatementKind::Load(load) => sheet.loads.push((load, at)),
+            StatementKind::Hole(hole) => sheet.holes.push((hole, at)),
             StatementKind::Rest { joint, value } => sheet.rests.push((joint, value, at)),
             StatementKind::Trace { name, direction: true, point, body } => {
                 if self.name_thing(scope, name, "direction") {
@@ -216,6 +220,15 @@ impl<'a> Evaluator<'a> {
                 }
             }
             StatementKind::Assert(assert) => sheet.asserts.push((assert, at)),
+            StatementKind::Case(case) => {
+                if self.name_thing(scope, &case.name, "load case") {
+                    let mut inner = Sheet::default();
+                    case.statements.iter().for_each(|s| self.statement(scope, s, &mut inner));
+                    sheet.broken |= inner.broken;
+                    sheet.later |= inner.later;
+                    sheet.cases.push((&case.name, inner, at));
+                }
+            }
             // Variants are set from outside; what is repeated has been written out.
             StatementKind::Variant(_) | StatementKind::For(_) => {}
             StatementKind::Rod(_) | StatementKind::OwnBody { .. } => self.out.push(

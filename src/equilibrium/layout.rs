@@ -48,6 +48,8 @@ pub struct Layout {
     pub traces: Vec<LayoutTrace>,
     /// Traced directions.
     pub directions: Vec<LayoutDirection>,
+    /// N, the steps of the cycle.
+    pub steps: usize,
     /// Whether states 0 and N are the same pose.
     pub closed: bool,
     /// Rest pose of each body relative to the drawing pose.
@@ -169,6 +171,7 @@ impl Layout {
             loads,
             traces,
             directions,
+            steps: design.cycle.steps,
             closed,
             rest_poses,
             joint_points: joint_points.clone(),
@@ -189,7 +192,7 @@ impl Layout {
     /// Number of states 0..=N.
     pub fn states(&self) -> usize {
         let of_loads = self.loads.iter().map(|l| l.values.len());
-        self.drives.iter().map(|d| d.values.len()).chain(of_loads).max().unwrap_or(1)
+        self.drives.iter().map(|d| d.values.len()).chain(of_loads).max().unwrap_or(self.steps + 1)
     }
 
     /// Number of states that count in sums: a closed cycle's last state is its first.

@@ -22,7 +22,7 @@ const EDGES: usize = 20;
 
 /// Whether weight matters.
 pub fn has_gravity(design: &Design) -> bool {
-    design.loads.iter().any(|l| matches!(l.kind, LoadKind::Gravity { .. }))
+    design.all_loads().any(|l| matches!(l.kind, LoadKind::Gravity { .. }))
 }
 
 /// What the printed form of each body has beyond flat bars at `values` (the free variables in order). None for a design

@@ -1,6 +1,6 @@
-//! Loads on the mechanism from outside: dead forces, moments about an axis, the weight of its parts.
+//! Loads on the mechanism from outside: dead forces, moments about an axis, the weight of its parts; and load cases.
 
-use super::{BodyId, Design, ExprPoint, Origin, Profile};
+use super::{BodyId, Design, ExprPoint, Objective, Origin, Profile, Requirement};
 use serde::{Deserialize, Serialize};
 
 /// Sizes at t = 0 and t = 1 that agree to this part of the larger make the same pose.
@@ -61,7 +61,45 @@ impl Load {
     }
 }
 
+/// A load case: the same mechanism goes through the same cycle once more, with further loads.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LoadCase {
+    /// Name.
+    pub name: String,
+    /// Loads besides the design's own.
+    pub loads: Vec<Load>,
+    /// Terms of the objective that are about this case.
+    pub objectives: Vec<Objective>,
+    /// Acceptance tests of this case.
+    pub requirements: Vec<Requirement>,
+    /// Declaration.
+    pub origin: Origin,
+}
+
 impl Design {
+    /// The design under a load case: the same mechanism with the case's loads besides its own, asked only what the case
+    /// asks. All that can be done with a design can be done with it.
+    pub fn under(&self, case: &LoadCase) -> Self {
+        let loads = self.loads.iter().chain(&case.loads).cloned().collect();
+        let (objectives, requirements) = (case.objectives.clone(), case.requirements.clone());
+        Self { loads, objectives, requirements, cases: Vec::new(), ..self.clone() }
+    }
+
+    /// Its own loads and those of its cases.
+    pub fn all_loads(&self) -> impl Iterator<Item = &Load> {
+        self.loads.iter().chain(self.cases.iter().flat_map(|c| &c.loads))
+    }
+
+    /// Its own terms of the objective and those of its cases.
+    pub fn all_objectives(&self) -> impl Iterator<Item = &Objective> {
+        self.objectives.iter().chain(self.cases.iter().flat_map(|c| &c.objectives))
+    }
+
+    /// Its own acceptance tests and those of its cases.
+    pub fn all_requirements(&self) -> impl Iterator<Item = &Requirement> {
+        self.requirements.iter().chain(self.cases.iter().flat_map(|c| &c.requirements))
+    }
+
     /// Whether drives and loads are at t = 1 where they were at t = 0: the last state is then the first once more.
     pub fn is_closed(&self) -> bool {
         self.drives.iter().all(|d| d.is_closed()) && self.loads.iter().all(Load::is_closed)

@@ -16,7 +16,7 @@ pub use assembly::{Assembly, Instance, Placement};
 pub use code::{CodeKind, MotorMotion, Stretch, Wanted, Workspace};
 pub use drive::{Cable, Drive, DriveOn, DriveUnit, Profile};
 use expr::{ExprGraph, ExprId};
-pub use load::{Load, LoadKind};
+pub use load::{Load, LoadCase, LoadKind};
 pub use model::RodModel;
 use serde::{Deserialize, Serialize};
 pub use solution::Solution;
@@ -54,6 +54,9 @@ pub struct Design {
     /// Loads from outside.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub loads: Vec<Load>,
+    /// Load cases: the cycle once more under further loads.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cases: Vec<LoadCase>,
     /// Steps and duration.
     pub cycle: Cycle,
     /// Traced points.
@@ -89,7 +92,7 @@ impl Design {
         roots.extend(self.traces.iter().flat_map(|t| t.point));
         roots.extend(self.strings.iter().flat_map(|c| c.via.iter().flatten().chain(&c.point)));
         roots.extend(self.drives.iter().filter_map(|d| d.free_rest));
-        for load in &self.loads {
+        for load in self.all_loads() {
             match &load.kind {
                 LoadKind::Force { point, .. } => roots.extend(point),
                 // Links are weighed by their skeletons.
@@ -136,10 +139,26 @@ pub struct Body {
     /// text's bodies and has no skeleton. The conventional mechanism carries it with the joint's first body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub owner: Option<JointId>,
+    /// Holes through it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub holes: Vec<Hole>,
     /// What gravity needs of the printed form at some values; derived, and so no part of the design's text form.
     #[serde(skip)]
     pub printed: Option<PrintedExtra>,
     /// Declaration.
+    pub origin: Origin,
+}
+
+/// A hole through a body, for a screw or a thread.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Hole {
+    /// Its middle in the drawing pose. No point of the skeleton: frames of flexures do not depend on it.
+    pub position: ExprPoint,
+    /// Diameter, mm.
+    pub diameter_mm: f64,
+    /// Unit direction in the drawing pose.
+    pub axis: [f64; 3],
+    /// Statement.
     pub origin: Origin,
 }
 
@@ -660,6 +679,8 @@ pub enum ExportKind {
     Png,
     /// A drawing of the rest pose.
     Svg,
+    /// A page that shows all of it.
+    Report,
     /// Arduino sketch for one drive. Index into [`Design::drives`].
     Arduino(usize),
     /// Code or keyframes for these drives, all where none is named. Indices into [`Design::drives`].

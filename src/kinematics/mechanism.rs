@@ -255,7 +255,7 @@ fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
     let traces = design.traces.iter().all(|t| body(&t.body))
         && aims.directions.iter().all(|d| body(&d.body))
         && aims.angles.iter().all(|a| body(&a.body));
-    let loads = design.loads.iter().all(|l| match &l.kind {
+    let loads = design.all_loads().all(|l| match &l.kind {
         LoadKind::Force { body: b, .. } | LoadKind::Moment { body: b, .. } => body(b),
         LoadKind::Gravity { .. } => true,
     });
@@ -292,7 +292,7 @@ fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
             .help("a drive turns at most 100 times, or slides at most 10 m, in a cycle"),
         ]);
     } else if let Some(load) =
-        design.loads.iter().find(|l| (0..=steps).any(|i| !l.size(i as f64 / steps as f64).is_finite()))
+        design.all_loads().find(|l| (0..=steps).any(|i| !l.size(i as f64 / steps as f64).is_finite()))
     {
         return Err(vec![
             Diagnostic::error("E0500", "a load has no size somewhere in the cycle", load.origin)

@@ -106,7 +106,7 @@ impl Motion {
 pub fn solve_motion(design: &Design, p: &[f64]) -> Result<Motion, Vec<Diagnostic>> {
     let mechanism = Mechanism::new(design, p)?;
     let mobility = Mobility::of(&mechanism);
-    if !design.is_driven() && !design.loads.is_empty() {
+    if !design.is_driven() && design.all_loads().next().is_some() {
         return standing(&mechanism, mobility);
     }
     if let Some(found) = mobility.diagnose(&mechanism) {

@@ -136,10 +136,17 @@ fn sorted() -> Vec<(&'static str, &'static str)> {
     all
 }
 
-/// The code or name nearest to a word that is none.
-pub fn nearest(word: &str) -> Option<&'static str> {
+/// Codes and names shown for one that is none, at most.
+const MOST_NEAR: usize = 3;
+
+/// The codes and names nearest to a word that is none, those of them that are equally near; none where it is like none.
+pub fn nearest(word: &str) -> Vec<&'static str> {
     let all = codes().map(|(c, _)| c).chain(RULES.iter().map(|e| e.rule.name));
-    let lower = word.to_uppercase();
-    let distance = |c: &str| strsim::damerau_levenshtein(c, word).min(strsim::damerau_levenshtein(c, &lower));
-    all.map(|c| (distance(c), c)).min().filter(|(d, c)| 3 * d <= c.len()).map(|(_, c)| c)
+    let upper = word.to_uppercase();
+    let distance = |c: &str| strsim::damerau_levenshtein(c, word).min(strsim::damerau_levenshtein(c, &upper));
+    let mut near: Vec<(usize, &str)> =
+        all.map(|c| (distance(c), c)).filter(|(d, c)| 3 * d <= c.len()).collect();
+    near.sort_unstable();
+    let least = near.first().map_or(0, |n| n.0);
+    near.into_iter().take_while(|(d, _)| *d == least).take(MOST_NEAR).map(|(_, c)| c).collect()
 }

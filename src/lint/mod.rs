@@ -15,6 +15,7 @@ pub mod explain;
 pub mod levels;
 mod rules;
 mod shapes;
+mod strain;
 mod views;
 mod walk;
 

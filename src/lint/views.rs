@@ -157,7 +157,7 @@ impl<'a> OfDesign<'a> {
 
     /// What is required of it: by itself, and by the mechanism that places it.
     pub fn requirements(&self) -> impl Iterator<Item = &'a Requirement> {
-        self.design.requirements.iter().chain(self.assembly.requirements.iter().map(|r| &r.requirement))
+        self.design.all_requirements().chain(self.assembly.requirements.iter().map(|r| &r.requirement))
     }
 
     /// Whether everything turns about one direction: a planar mechanism of hinges.

@@ -69,6 +69,10 @@ pub fn expressions<'a>(s: &'a Statement, f: &mut dyn FnMut(&'a Expr)) {
             Load::Moment { size, about, .. } => [size, about].into_iter().for_each(f),
             Load::Force { size, along, point, .. } => [size, along, point].into_iter().for_each(f),
         },
+        K::Hole(hole) => {
+            [&hole.diameter, &hole.point].into_iter().for_each(&mut *f);
+            hole.along.iter().for_each(f);
+        }
         K::Rod(r) => {
             for end in [&r.from, &r.to] {
                 f(&end.position);
@@ -90,6 +94,7 @@ pub fn expressions<'a>(s: &'a Statement, f: &mut dyn FnMut(&'a Expr)) {
             [&l.first, &l.last].into_iter().for_each(&mut *f);
             l.statements.iter().for_each(|s| expressions(s, f));
         }
+        K::Case(c) => c.statements.iter().for_each(|s| expressions(s, f)),
         K::Place(p) => {
             f(&p.point);
             p.overrides.iter().for_each(|(_, v)| f(v));
@@ -152,6 +157,7 @@ pub fn references<'a>(s: &'a Statement, f: &mut dyn FnMut(&'a Ident)) {
         K::Variant(v) => v.settings.iter().for_each(|(name, _)| f(name)),
         K::Workspace(w) => w.stretches.iter().for_each(|s| f(&s.drive)),
         K::For(l) => return l.statements.iter().for_each(|s| references(s, f)),
+        K::Case(c) => return c.statements.iter().for_each(|s| references(s, f)),
         _ => {}
     }
     expressions(s, &mut |e| names(e, f));

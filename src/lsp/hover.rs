@@ -50,9 +50,13 @@ fn head(symbol: &Symbol, source: &str) -> String {
     let whole = source.get(symbol.whole.clone()).unwrap_or("");
     let line = whole.lines().next().unwrap_or("");
     let head = match symbol.what {
-        What::Mechanism | What::Flexure | What::Material | What::Process | What::Motor | What::Rod => {
-            line.trim_end_matches(['{', ' '])
-        }
+        What::Mechanism
+        | What::Flexure
+        | What::Material
+        | What::Process
+        | What::Motor
+        | What::Rod
+        | What::Case => line.trim_end_matches(['{', ' ']),
         _ => line,
     };
     head.split_whitespace().collect::<Vec<_>>().join(" ")

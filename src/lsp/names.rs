@@ -24,6 +24,7 @@ pub enum What {
     Output,
     Instance,
     Rod,
+    Case,
 }
 
 /// A declared name.
@@ -152,6 +153,7 @@ impl<'a> Walk<'a> {
             Kind::Output => own(What::Output, 0),
             Kind::Place | Kind::Mirror => own(What::Instance, 0),
             Kind::Rod => own(What::Rod, 0),
+            Kind::Case => own(What::Case, 0),
             _ => None,
         };
         let outer = self.block;

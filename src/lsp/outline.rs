@@ -79,5 +79,6 @@ pub fn word(what: What) -> &'static str {
         What::Output => "output",
         What::Instance => "instance",
         What::Rod => "rod",
+        What::Case => "load case",
     }
 }

@@ -25,6 +25,8 @@ pub struct Problem<'d> {
     objectives: Vec<Term>,
     /// Per load case one force a state, in that layout.
     cases: Vec<Vec<PointForce>>,
+    /// The same design under its load cases, each with its name: their terms are added.
+    under: Vec<(String, Problem<'d>)>,
     /// Largest sample of each soft maximum at the first point simulated: what its sharpness refers to.
     references: OnceLock<Vec<f64>>,
     edges: usize,
@@ -53,12 +55,15 @@ pub struct Trial<'d> {
     capsules: Vec<SkeletonCapsule>,
     /// Per counted state its equilibria under the load cases; empty without load cases.
     loaded: Vec<Vec<Equilibrium>>,
+    /// The same point under the design's load cases.
+    under: Vec<Trial<'d>>,
 }
 
 impl Trial<'_> {
-    /// True largest von Mises stress over the cycle, MPa.
+    /// True largest von Mises stress over the cycle, also under load cases that have terms, MPa.
     pub fn max_stress_mpa(&self) -> f64 {
-        self.cycle.states.iter().map(|s| s.max_stress_mpa(&self.model)).fold(0.0, f64::max)
+        let own = self.cycle.states.iter().map(|s| s.max_stress_mpa(&self.model));
+        own.chain(self.under.iter().map(Trial::max_stress_mpa)).fold(0.0, f64::max)
     }
 
     /// Largest distance of any trace from its target, mm: from the place of the same time, or where it is tracked
@@ -106,11 +111,18 @@ impl<'d> Problem<'d> {
             moving: !design.geometry_variables().is_empty(),
             objectives,
             cases,
+            under: Vec::new(),
             references: OnceLock::new(),
             edges,
             needs_links: objectives::needs_links(design),
             simulations: AtomicUsize::new(0),
         }
+    }
+
+    /// With the terms of load cases: by name the problem of the design under each ([`Design::under`]).
+    pub fn with_cases(mut self, under: Vec<(String, Problem<'d>)>) -> Self {
+        self.under = under;
+        self
     }
 
     /// Number of design parameters.
@@ -120,9 +132,11 @@ impl<'d> Problem<'d> {
 
     /// Names of the terms, the guards last.
     pub fn term_names(&self) -> Vec<String> {
-        let mut names: Vec<String> = self.objectives.iter().map(|o| o.name().to_string()).collect();
-        names.push("shape".to_string());
-        names
+        let own = self.objectives.iter().map(|o| o.name().to_string());
+        let cases = self.under.iter().flat_map(|(case, problem)| {
+            problem.objectives.iter().map(move |o| format!("{case}: {}", o.name()))
+        });
+        own.chain(cases).chain(["shape".to_string()]).collect()
     }
 
     /// What an rms error of this part of its scale adds to the cost, of the track that counts most; zero where none has a scale.
@@ -158,8 +172,21 @@ impl<'d> Problem<'d> {
             .collect()
     }
 
-    /// Simulates the cycle at `x`; none where the mechanism cannot be built or followed.
+    /// Simulates the cycle at `x`, once more for every load case; none where the mechanism cannot be built or followed.
     pub fn simulate(&self, x: &[f64]) -> Option<Trial<'d>> {
+        let mut trial = self.simulate_own(x)?;
+        for (_, problem) in &self.under {
+            let under = problem.simulate_own(x)?;
+            trial.terms.extend(&under.terms);
+            trial.under.push(under);
+        }
+        trial.terms.push(guards::cost(&trial.model));
+        trial.cost = trial.terms.iter().sum();
+        trial.cost.is_finite().then_some(trial)
+    }
+
+    /// The same with its own loads and terms only, and without what keeps rods sound.
+    fn simulate_own(&self, x: &[f64]) -> Option<Trial<'d>> {
         self.simulations.fetch_add(1, Ordering::Relaxed);
         let p = self.to_parameters(x);
         let layout = self.layout_at(&p)?;
@@ -199,10 +226,8 @@ impl<'d> Problem<'d> {
             }
         }
         drop(views);
-        terms.push(guards::cost(&model));
-        let cost: f64 = terms.iter().sum();
-        let made = Trial { x: x.to_vec(), model, cycle, cost, terms, levels, cases, capsules, loaded };
-        cost.is_finite().then_some(made)
+        let (x, cost, under) = (x.to_vec(), 0.0, Vec::new());
+        Some(Trial { x, model, cycle, cost, terms, levels, cases, capsules, loaded, under })
     }
 
     /// Cost of the limits of sound rods at `x`, without simulating; none where the mechanism cannot be built.
@@ -280,6 +305,24 @@ impl<'d> Problem<'d> {
     /// cannot be confirmed. The states are independent; their sums are formed in order, so that the
     /// result does not depend on the number of threads.
     pub fn differentiate(&self, trial: &Trial<'d>) -> Option<Derivatives> {
+        let mut normal = self.differentiate_own(trial)?;
+        for ((_, problem), under) in self.under.iter().zip(&trial.under) {
+            normal.merge(&problem.differentiate_own(under)?);
+        }
+        let mut hinges = guards::hinges(&trial.model);
+        normal.complete();
+        for (i, f) in self.design.free.iter().enumerate() {
+            let width = f.upper - f.lower;
+            normal.gradient[i] *= width;
+            normal.gauss_newton.row_mut(i).scale_mut(width);
+            normal.gauss_newton.column_mut(i).scale_mut(width);
+            hinges.iter_mut().for_each(|h| h.row[i] *= width);
+        }
+        Some(Derivatives { normal, hinges })
+    }
+
+    /// Of its own loads and terms only, by p; the matrix's lower triangle.
+    fn differentiate_own(&self, trial: &Trial<'d>) -> Option<Normal> {
         let n = self.parameters();
         let changes = objectives::load_changes(self.design, &trial.model.layout);
         let parts: Vec<Option<Vec<Normal>>> = (0..self.layout.counted_states())
@@ -324,16 +367,7 @@ impl<'d> Problem<'d> {
             level.complete(weight, &mut total);
             sum.merge(&total);
         }
-        let mut hinges = guards::hinges(&trial.model);
-        sum.complete();
-        for (i, f) in self.design.free.iter().enumerate() {
-            let width = f.upper - f.lower;
-            sum.gradient[i] *= width;
-            sum.gauss_newton.row_mut(i).scale_mut(width);
-            sum.gauss_newton.column_mut(i).scale_mut(width);
-            hinges.iter_mut().for_each(|h| h.row[i] *= width);
-        }
-        Some(Derivatives { normal: sum, hinges })
+        Some(sum)
     }
 
     /// One state's contributions: that of all sums, then of each soft maximum.

@@ -4,12 +4,13 @@ use super::aims::AimSeries;
 use super::measure::{check_requirement, check_requirements, is_closed, measure};
 use super::report::{Measures, Place, RequirementResult, Worst};
 use super::stability::{DriveValues, Stability};
-use super::stages::{Between, Simulation};
+use super::stages::{Between, Failed, Simulation};
 use crate::diagnostic::Diagnostic;
 use crate::emit::csv::{MotionState, MotionTable};
 use crate::ir::{Assembly, Design, Instance, Placement};
 use crate::math::exp_so3;
 use nalgebra::Vector3;
+use std::borrow::Cow;
 
 /// What every instance does, in the assembly's coordinates and states; `designs` are the simulations of the designs.
 /// A drive's load is that of its motor: the sum over all instances that have it in common.
@@ -17,6 +18,63 @@ pub fn place(assembly: &Assembly, designs: &[Simulation]) -> Vec<Simulation> {
     if assembly.single().is_some() {
         return designs.to_vec();
     }
+    let mut placed = place_own(assembly, designs);
+    // A case is one of every design that has it; the others stay as they are. So common motors bear their sums.
+    let named = |d: &Design, name: &str| d.cases.iter().position(|c| c.name == name);
+    for ((_, d), own) in assembly.placed().zip(&mut placed) {
+        own.cases.resize(d.cases.len(), Simulation::default());
+    }
+    for name in case_names(assembly) {
+        let of = |(d, s): (&Design, &Simulation)| {
+            let case = named(d, &name).and_then(|k| s.cases.get(k)).unwrap_or(s);
+            Simulation { cases: Vec::new(), ..case.clone() }
+        };
+        let under: Vec<Simulation> = assembly.designs.iter().zip(designs).map(of).collect();
+        for ((own, under), (_, d)) in
+            placed.iter_mut().zip(place_own(assembly, &under)).zip(assembly.placed())
+        {
+            if let Some(slot) = named(d, &name).and_then(|k| own.cases.get_mut(k)) {
+                *slot = under;
+            }
+        }
+    }
+    placed
+}
+
+/// What every instance does under a load case; those without it do what they do.
+///
+/// # Errors
+/// Where no design has it.
+pub fn under(assembly: &Assembly, placed: Vec<Simulation>, name: &str) -> Result<Vec<Simulation>, Failed> {
+    let known = case_names(assembly);
+    if !known.iter().any(|k| k == name) {
+        let d = Diagnostic::error("E0120", format!("there is no load case `{name}`"), assembly.origin);
+        return Err(vec![match known.is_empty() {
+            true => d.help(format!(
+                "add for instance `case {name} {{ load 2 N along (0, -1, 0) on coupler at P }}`"
+            )),
+            false => d.help(format!("there are: {}", known.join(", "))),
+        }]);
+    }
+    let of = |((_, d), s): ((_, &Design), Simulation)| {
+        let k = d.cases.iter().position(|c| c.name == name);
+        k.and_then(|k| s.cases.get(k).cloned()).unwrap_or(s)
+    };
+    Ok(assembly.placed().zip(placed).map(of).collect())
+}
+
+/// Names of the load cases of all designs, each once.
+fn case_names(assembly: &Assembly) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for case in assembly.designs.iter().flat_map(|d| &d.cases) {
+        if !names.contains(&case.name) {
+            names.push(case.name.clone());
+        }
+    }
+    names
+}
+
+fn place_own(assembly: &Assembly, designs: &[Simulation]) -> Vec<Simulation> {
     let pairs = assembly.placed().filter_map(|(i, d)| Some((i, d, designs.get(i.design)?)));
     let mut placed: Vec<Simulation> = pairs.map(|(i, d, s)| placed_simulation(assembly, i, d, s)).collect();
     for motor in 0..assembly.motors.len() {
@@ -74,6 +132,7 @@ fn placed_simulation(
             true => placed_stability(instance, &simulation.stability),
             false => Default::default(),
         },
+        cases: Vec::new(),
         diagnostics: Vec::new(),
     }
 }
@@ -226,12 +285,39 @@ fn kept<T: Clone>(values: &[T], which: &[bool]) -> Vec<T> {
     values.iter().zip(which).filter(|(_, keep)| **keep).map(|(v, _)| v.clone()).collect()
 }
 
-/// Measures by instance (`right.wheel`), a motor in common once, stress and gap of all.
+/// Measures by instance (`right.wheel`), a motor in common once, stress and gap of all; under a load case, of the
+/// instances that have it.
 pub fn measure_all(assembly: &Assembly, placed: &[Simulation], between: &Between) -> Measures {
+    if assembly.single().is_some() {
+        let pair = assembly.placed().zip(placed).next();
+        return pair.map(|((_, design), s)| measure(design, s)).unwrap_or_default();
+    }
+    let own = assembly.placed().zip(placed).map(|((_, d), s)| Some((Cow::Borrowed(d), s)));
+    let mut all = merged(assembly, own, &between.worst);
+    all.gap.least_mm =
+        between.gaps_mm.iter().fold(all.gap.least_mm, |least, g| more(least, Some(*g), f64::min));
+    for name in case_names(assembly) {
+        let under = assembly.placed().zip(placed).map(|((_, d), s)| {
+            let k = d.cases.iter().position(|c| c.name == name)?;
+            Some((Cow::Owned(d.under(d.cases.get(k)?)), s.cases.get(k)?))
+        });
+        let under = merged(assembly, under, &Worst::default());
+        all.cases.insert(name, under);
+    }
+    all
+}
+
+/// Of what every instance is and does; none where it is not looked at.
+fn merged<'a>(
+    assembly: &Assembly,
+    of: impl Iterator<Item = Option<(Cow<'a, Design>, &'a Simulation)>>,
+    between: &Worst,
+) -> Measures {
     let mut all = Measures::default();
     let mut worst = Worst::default();
-    for (i, ((instance, design), simulation)) in assembly.placed().zip(placed).enumerate() {
-        let own = measure(design, simulation);
+    for (i, (instance, of)) in assembly.instances.iter().zip(of).enumerate() {
+        let Some((design, simulation)) = of else { continue };
+        let own = measure(&design, simulation);
         all.directions.extend(own.directions.into_iter().map(|(n, d)| (instance.of(&n), d)));
         all.outputs.extend(own.outputs.into_iter().map(|(n, o)| (instance.of(&n), o)));
         all.traces.extend(own.traces.into_iter().map(|(n, t)| (instance.of(&n), t)));
@@ -253,9 +339,7 @@ pub fn measure_all(assembly: &Assembly, placed: &[Simulation], between: &Between
             all.stability.snaps.extend(own.stability.snaps);
         }
     }
-    worst.take(&between.worst);
-    all.gap.least_mm =
-        between.gaps_mm.iter().fold(all.gap.least_mm, |least, g| more(least, Some(*g), f64::min));
+    worst.take(between);
     all.stress.place = worst.stress.map(|w| w.1);
     all.gap.place = worst.gap.map(|w| w.1);
     all

@@ -6,11 +6,11 @@ use super::gravity;
 use super::joined::{self, Solid};
 use super::products::{self, Built};
 use super::progress::Iteration;
-use super::report::{Artefact, Place, Worst};
+use super::report::{Place, Worst};
 use super::scene::Moving;
 use super::solids;
 use super::stability;
-use super::stages::{Between, Checked, Failed, Response, Simulation, Solved, Stages};
+use super::stages::{Between, Checked, Failed, Parts, Response, Simulation, Solved, Stages};
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
@@ -103,7 +103,7 @@ impl Stages for Compiler {
         simulation.gaps_mm = gaps.least.iter().filter_map(|g| g.map(|g| g.gap_mm)).collect();
         simulation.worst.gap = solids::nearest(design, &gaps);
         simulation.stability = stability;
-        Ok(simulation)
+        self.loaded(design, values, simulation)
     }
 
     fn sweep(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
@@ -111,7 +111,7 @@ impl Stages for Compiler {
         let (layout, motion) = layout(design, values)?;
         let model = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
         let cycle = sweep(&model).map_err(|e| lost(design, &e))?;
-        Ok(swept(design, &layout, &model, &cycle, &motion))
+        self.loaded(design, values, swept(design, &layout, &model, &cycle, &motion))
     }
 
     fn flexure_lengths(&self, design: &Design, values: &[f64], motion: &Motion) -> Option<Vec<f64>> {
@@ -176,11 +176,7 @@ impl Stages for Compiler {
         })
     }
 
-    fn parts(
-        &self,
-        assembly: &Assembly,
-        values: &[Vec<f64>],
-    ) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
+    fn parts(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Result<Parts, Failed> {
         let mut found = Vec::new();
         let (mut built, mut moving) = (Vec::new(), Vec::new());
         for (d, (design, values)) in assembly.designs.iter().zip(values).enumerate() {
@@ -203,13 +199,28 @@ impl Stages for Compiler {
         let (parts, findings) = joined::parts(assembly, &built)?;
         found.extend(findings);
         let whole = Built { assembly, solids: &built, moving: &moving, printed: &parts };
-        let (artefacts, findings) = products::artefacts(&whole);
-        found.extend(findings);
-        Ok((artefacts, found))
+        let made = products::artefacts(&whole);
+        found.extend(made.diagnostics);
+        Ok(Parts { diagnostics: found, ..made })
     }
 }
 
 impl Compiler {
+    /// A simulation with those of the design's load cases.
+    fn loaded(&self, design: &Design, values: &[f64], mut own: Simulation) -> Result<Simulation, Failed> {
+        for case in &design.cases {
+            let here = |found: Vec<Diagnostic>| -> Vec<Diagnostic> {
+                found.into_iter().map(|d| d.also(case.origin, "in this load case")).collect()
+            };
+            let mut under = self.sweep(&design.under(case), values).map_err(here)?;
+            let mut found = std::mem::take(&mut under.diagnostics);
+            found.retain(|d| !own.diagnostics.contains(d));
+            own.diagnostics.extend(here(found));
+            own.cases.push(under);
+        }
+        Ok(own)
+    }
+
     /// One run of the optimiser.
     fn solve(
         &self,
@@ -223,7 +234,7 @@ impl Compiler {
             return Err(vec![dead_point(design)]);
         }
         if let Some(term) =
-            design.objectives.iter().find(|o| matches!(o.kind, ObjectiveKind::Collision { .. }))
+            design.all_objectives().find(|o| matches!(o.kind, ObjectiveKind::Collision { .. }))
         {
             let asks = |d: Diagnostic| {
                 d.also(term.origin, "this term sees the printed form").help(
@@ -237,7 +248,13 @@ impl Compiler {
             }
             solids::plannable(design, &layout, start, EDGES)?;
         }
-        let problem = Problem::new(design, &layout, EDGES);
+        let asked = design.cases.iter().filter(|c| !c.objectives.is_empty());
+        let cases: Vec<_> = asked.map(|c| (&c.name, design.under(c))).collect();
+        let layouts = cases.iter().map(|(_, d)| Ok(self::layout(d, start)?.0));
+        let layouts = layouts.collect::<Result<Vec<Layout>, Failed>>()?;
+        let under =
+            cases.iter().zip(&layouts).map(|((name, d), l)| ((*name).clone(), Problem::new(d, l, EDGES)));
+        let problem = Problem::new(design, &layout, EDGES).with_cases(under.collect());
         let names = problem.term_names();
         let told = |i: &optimize::Iteration| {
             on_iteration(&Iteration {
@@ -254,8 +271,7 @@ impl Compiler {
             self.simulate(design, start)?;
             let message = "the optimiser has nowhere to begin: an objective cannot be computed at the start";
             let loaded = design
-                .objectives
-                .iter()
+                .all_objectives()
                 .find(|o| matches!(o.kind, ObjectiveKind::Sway { .. } | ObjectiveKind::SwayAlong { .. }));
             let at = loaded.map_or(design.origin, |o| o.origin);
             return Err(vec![
@@ -371,6 +387,7 @@ fn along(design: &Design, drives: &[Vec<f64>]) -> Design {
     design.aims.targets.clear();
     design.objectives.clear();
     design.requirements.clear();
+    design.cases.clear();
     design
 }
 
@@ -418,7 +435,7 @@ fn table(design: &Design, has_forces: bool, states: Vec<MotionState>) -> MotionT
         traces: design.traces.iter().map(|t| t.name.clone()).collect(),
         bodies: design.bodies.iter().filter(|b| !b.ground).map(|b| b.name.clone()).collect(),
         has_forces,
-        has_loads: !design.loads.is_empty(),
+        has_loads: design.all_loads().next().is_some(),
         states,
         ..MotionTable::default()
     }

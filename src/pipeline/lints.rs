@@ -55,6 +55,10 @@ pub(super) fn sort(out: &mut BuildOutcome, told: usize) {
     }
 }
 
+/// Rules about the solution that load cases are looked at with: stress, torque, strain. That a case moves a traced point
+/// off its target is what it is there to show.
+const OF_CASES: [&str; 4] = ["W1301", "W1302", "W1303", "W1304"];
+
 /// What the solution shows; `values` and `simulations` are one a design.
 pub(super) fn solved(
     assembly: &Assembly,
@@ -68,12 +72,26 @@ pub(super) fn solved(
         let view = Text::new(&out.sources, &out.files);
         for ((design, values), simulation) in assembly.designs.iter().zip(values).zip(simulations) {
             let of = OfDesign::new(&view, assembly, design);
-            let terms = if design.objectives.len() > 1 {
+            let terms = if design.all_objectives().nth(1).is_some() {
                 stages.terms(design, &super::starts(design))
             } else {
                 Vec::new()
             };
-            found.extend(lint::solution(&OfSolution { of: &of, solved: values, simulation, terms: &terms }));
+            let own = lint::solution(&OfSolution { of: &of, solved: values, simulation, terms: &terms });
+            // What loads do to parts and motors, where the design's own have not done it.
+            for (case, simulation) in design.cases.iter().zip(&simulation.cases) {
+                let under = design.under(case);
+                let of = OfDesign::new(&view, assembly, &under);
+                let mut more =
+                    lint::solution(&OfSolution { of: &of, solved: values, simulation, terms: &[] });
+                let place = |d: &Diagnostic| d.labels.first().map(|l| l.at);
+                more.retain(|d| {
+                    OF_CASES.contains(&d.code.as_str())
+                        && !own.iter().any(|o| o.code == d.code && place(o) == place(d))
+                });
+                found.extend(more.into_iter().map(|d| d.also(case.origin, "in this load case")));
+            }
+            found.extend(own);
         }
     }
     out.reached = Stage::Solution;

@@ -48,6 +48,8 @@ pub fn measure(design: &Design, simulation: &Simulation) -> Measures {
         least_mm: aggregate(&simulation.gaps_mm, Aggregate::Min, closed),
         place: simulation.worst.gap.as_ref().map(|w| w.1.clone()),
     };
+    let cases = design.cases.iter().zip(&simulation.cases);
+    measures.cases = cases.map(|(case, s)| (case.name.clone(), measure(&design.under(case), s))).collect();
     measures
 }
 
@@ -56,13 +58,26 @@ pub fn is_closed(design: &Design) -> bool {
     design.is_closed()
 }
 
-/// Checks every `require` line; one that fails is also a diagnostic at its line.
+/// Checks every `require` line, also those of load cases; one that fails is also a diagnostic at its line.
 pub fn check_requirements(
     design: &Design,
     simulation: &Simulation,
     found: &mut Vec<Diagnostic>,
 ) -> Vec<RequirementResult> {
-    design.requirements.iter().map(|r| check_requirement(r, is_closed(design), simulation, found)).collect()
+    let own = design.requirements.iter();
+    let mut results: Vec<RequirementResult> =
+        own.map(|r| check_requirement(r, is_closed(design), simulation, found)).collect();
+    for (k, case) in design.cases.iter().enumerate() {
+        let closed = is_closed(&design.under(case));
+        // What was not simulated could not be measured.
+        let simulation = simulation.cases.get(k).cloned().unwrap_or_default();
+        for requirement in &case.requirements {
+            let result = check_requirement(requirement, closed, &simulation, found);
+            results
+                .push(RequirementResult { text: format!("case {}: {}", case.name, result.text), ..result });
+        }
+    }
+    results
 }
 
 pub(super) fn check_requirement(

@@ -29,6 +29,9 @@ pub struct Measures {
     pub gap: GapMeasures,
     /// With the drives released.
     pub stability: Stability,
+    /// Under each load case, without gap and stability.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub cases: BTreeMap<String, Measures>,
 }
 
 /// A trace against its target: the place of the same time, or where it is tracked by form only, the nearest one.

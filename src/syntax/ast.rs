@@ -243,6 +243,8 @@ pub enum StatementKind {
     String(Box<Cable>),
     /// `load …`
     Load(Box<Load>),
+    /// `hole DIAMETER on BODY at P [along D]`
+    Hole(Box<Hole>),
     /// `rod NAME { [axis second] from a at … along … to b at … along … section … }` (templates only)
     Rod(Box<Rod>),
     /// `place NAME = MECHANISM [{ overrides }] at P [turned A about D] [scale = K] [merging GROUND into BODY]…`
@@ -255,6 +257,8 @@ pub enum StatementKind {
     Variant(Box<Variant>),
     /// `for NAME in A .. B { … }`: repeats instances
     For(Box<For>),
+    /// `case NAME { load … minimize { … } require … }`: the cycle once more, under other loads
+    Case(Box<Case>),
     /// `body NAME`: a body that a template brings along (templates only)
     OwnBody {
         /// Name.
@@ -289,6 +293,19 @@ pub struct Cable {
     pub to: Ident,
     /// Through which points of that body, in order.
     pub via: Vec<Expr>,
+}
+
+/// A hole through a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hole {
+    /// Diameter.
+    pub diameter: Expr,
+    /// The body.
+    pub body: Ident,
+    /// Where.
+    pub point: Expr,
+    /// Its direction.
+    pub along: Option<Expr>,
 }
 
 /// A load on the mechanism.
@@ -406,6 +423,15 @@ pub struct For {
     /// Its last value.
     pub last: Expr,
     /// `place`, `mirror`, `require`, `export`, `for`.
+    pub statements: Vec<Statement>,
+}
+
+/// A load case: what the mechanism meets besides its own loads, and what is asked of it there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Case {
+    /// Name.
+    pub name: Ident,
+    /// `load`, `minimize`, `require`.
     pub statements: Vec<Statement>,
 }
 

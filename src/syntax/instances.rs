@@ -1,6 +1,6 @@
-//! `place`, `mirror`, `for`, `variant` and `assert`: concrete tree to their views in [`ast`](super::ast).
+//! `place`, `mirror`, `for`, `case`, `variant` and `assert`: concrete tree to their views in [`ast`](super::ast).
 
-use super::ast::{Assert, At, For, Mirror, Place, StatementKind, Variant};
+use super::ast::{Assert, At, Case, For, Mirror, Place, Statement, StatementKind, Variant};
 use super::lower::Lower;
 use super::tree::{Kind, Node};
 use crate::diagnostic::{Diagnostic, Origin};
@@ -73,24 +73,50 @@ impl Lower<'_> {
         let mut values = self.values(node).into_iter();
         let (first, last) = (values.next()?, values.next()?);
         let mut statements = self.statements(node);
-        for s in &mut statements {
-            if !matches!(
-                s.kind,
-                StatementKind::Place(_)
-                    | StatementKind::Mirror(_)
-                    | StatementKind::Require { .. }
-                    | StatementKind::Export(_)
-                    | StatementKind::For(_)
-                    | StatementKind::Later { .. }
-                    | StatementKind::Broken { .. }
-            ) {
-                self.report(
-                    Diagnostic::error("E0009", "this statement cannot be repeated", s.at)
-                        .help("a `for` holds `place`, `mirror`, `require`, `export` and further `for`s"),
-                );
+        self.only(
+            &mut statements,
+            |kind| {
+                use StatementKind::{Export, For, Mirror, Place, Require};
+                matches!(kind, Place(_) | Mirror(_) | Require { .. } | Export(_) | For(_))
+            },
+            [
+                "this statement cannot be repeated",
+                "a `for` holds `place`, `mirror`, `require`, `export` and further `for`s",
+            ],
+        );
+        Some(For { variable, first, last, statements })
+    }
+
+    pub(super) fn case(&mut self, node: &Node) -> Option<Case> {
+        let name = self.ident(node)?;
+        let mut statements = self.statements(node);
+        self.only(
+            &mut statements,
+            |kind| {
+                use StatementKind::{Load, Minimize, Require};
+                matches!(kind, Load(_) | Minimize(_) | Require { .. })
+            },
+            [
+                "a load case cannot change this",
+                "a `case` holds `load`, `minimize` and `require`; all else it shares with the mechanism",
+            ],
+        );
+        Some(Case { name, statements })
+    }
+
+    /// Takes statements out of a block that are not of its sort, with a message and a help.
+    fn only(
+        &mut self,
+        statements: &mut [Statement],
+        fits: impl Fn(&StatementKind) -> bool,
+        [message, help]: [&str; 2],
+    ) {
+        for s in statements {
+            let told = matches!(s.kind, StatementKind::Later { .. } | StatementKind::Broken { .. });
+            if !told && !fits(&s.kind) {
+                self.report(Diagnostic::error("E0009", message, s.at).help(help));
                 s.kind = StatementKind::Broken { words: Vec::new() };
             }
         }
-        Some(For { variable, first, last, statements })
     }
 }

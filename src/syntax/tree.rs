@@ -97,6 +97,7 @@ pub enum Kind {
     String,
     Via,
     Load,
+    Hole,
     Gravity,
     Moment,
     Force,
@@ -105,6 +106,7 @@ pub enum Kind {
     Variant,
     Setting,
     For,
+    Case,
     Later,
     // items
     File,

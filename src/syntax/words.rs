@@ -111,8 +111,10 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "assert" => "assert VALUE <= VALUE \"MESSAGE\"",
         "variant" => "variant NAME { NAME = VALUE, … }",
         "for" => "for NAME in FIRST .. LAST {",
+        "case" => "case NAME {",
         "string" => "string NAME: BODY at POINT to BODY via POINT",
         "allow" => "allow CODE \"REASON\"",
+        "hole" => "hole DIAMETER on BODY at POINT",
         "load" => "load FORCE along DIRECTION on BODY at POINT",
         _ => return None,
     })

@@ -212,6 +212,7 @@ fn statements_of_the_whole_language_are_known_by_their_keyword() {
                 let set: Vec<&str> = variant.settings.iter().map(|(path, _)| path.node.as_str()).collect();
                 format!("variant {} {set:?}", variant.name.node)
             }
+            StatementKind::Case(case) => format!("case {} {}", case.name.node, case.statements.len()),
             StatementKind::Assert(assert) => format!("assert {}", assert.message.node),
             StatementKind::For(text) => {
                 let names = text.statements.iter().map(|s| match &s.kind {
@@ -235,7 +236,7 @@ fn statements_of_the_whole_language_are_known_by_their_keyword() {
             "string via 1",
             "variant ring [\"x\", \"knee.thickness\", \"y\"]",
             "assert message { not closed",
-            "case",
+            "case heavy 1",
             "for i [\"finger[i]\", \"left[i+1]\"]",
             "2 keys Some(\"xl320\") true",
             "drum false",

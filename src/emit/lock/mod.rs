@@ -141,6 +141,11 @@ pub fn design_digest(design: &Design) -> String {
     if let Value::Object(fields) = &mut value {
         fields.remove("exports");
         fields.remove("requirements");
+        for case in fields.get_mut("cases").and_then(Value::as_array_mut).into_iter().flatten() {
+            if let Value::Object(case) = case {
+                case.remove("requirements");
+            }
+        }
         for drive in fields.get_mut("drives").and_then(Value::as_array_mut).into_iter().flatten() {
             if let Some(Value::Object(motor)) = drive.get_mut("motor") {
                 motor.remove("motion");

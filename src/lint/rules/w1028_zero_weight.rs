@@ -23,7 +23,7 @@ pub const RULE: Rule =
     Rule { code: "W1028", name: "zero-weight", severity: Severity::Warning, check: Check::Design(check) };
 
 fn check(of: &OfDesign) -> Vec<Diagnostic> {
-    let idle = of.design.objectives.iter().filter(|o| o.weight == 0.0);
+    let idle = of.design.all_objectives().filter(|o| o.weight == 0.0);
     idle.map(|o| {
         let d = RULE.finds("this term has the weight 0: it counts nothing", o.origin).help("remove it, or give it a weight");
         let edit = Edit::remove(of.text.of(o.origin.file), o.origin);

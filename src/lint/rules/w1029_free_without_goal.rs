@@ -24,7 +24,7 @@ pub const RULE: Rule =
 
 fn check(of: &OfDesign) -> Vec<Diagnostic> {
     let (design, count) = (of.design, of.design.free.len());
-    if count == 0 || !design.objectives.is_empty() {
+    if count == 0 || design.all_objectives().next().is_some() {
         return Vec::new();
     }
     // Only what the text itself frees: a template's own values are its starts, and may be good enough.

@@ -24,7 +24,7 @@ pub const RULE: Rule =
     Rule { code: "W1030", name: "goal-without-free", severity: Severity::Warning, check: Check::Design(check) };
 
 fn check(of: &OfDesign) -> Vec<Diagnostic> {
-    let first = of.design.objectives.first().filter(|_| of.design.free.is_empty());
+    let first = of.design.all_objectives().next().filter(|_| of.design.free.is_empty());
     let found = first.map(|o| {
         RULE.finds("nothing may vary: there is nothing to minimise by", o.origin)
             .help("make a joint a flexure with `as TEMPLATE`, or write `free START in LEAST .. MOST`")

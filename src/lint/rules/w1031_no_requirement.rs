@@ -24,7 +24,7 @@ pub const RULE: Rule =
 
 fn check(of: &OfDesign) -> Vec<Diagnostic> {
     let Some(export) = of.assembly.exports.first() else { return Vec::new() };
-    if of.requirements().next().is_some() || of.assembly.designs.iter().any(|d| !d.requirements.is_empty()) {
+    if of.requirements().next().is_some() || of.assembly.designs.iter().any(|d| d.all_requirements().next().is_some()) {
         return Vec::new();
     }
     vec![

@@ -38,8 +38,8 @@ fn scaled(kind: &K) -> Option<bool> {
 }
 
 fn check(of: &OfDesign) -> Vec<Diagnostic> {
-    let with = of.design.objectives.iter().find(|o| scaled(&o.kind) == Some(true));
-    let without = of.design.objectives.iter().find(|o| scaled(&o.kind) == Some(false) && o.weight != 0.0);
+    let with = of.design.all_objectives().find(|o| scaled(&o.kind) == Some(true));
+    let without = of.design.all_objectives().find(|o| scaled(&o.kind) == Some(false) && o.weight != 0.0);
     let (Some(with), Some(without)) = (with, without) else { return Vec::new() };
     vec![
         RULE.finds("this term has no `scale`, and another one has", without.origin)

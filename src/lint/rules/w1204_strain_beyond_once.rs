@@ -15,27 +15,12 @@
 //!
 //! Make it thinner or longer (`size`), turn less (see W1107), or take a material that bears more. There is no repair by itself.
 use crate::lint::prelude::*;
+use crate::lint::strain::Bears;
 
 /// See the module.
 pub const RULE: Rule =
     Rule { code: "W1204", name: "strain-beyond-once", severity: Severity::Warning, check: Check::Flexures(check) };
 
 fn check(view: &OfFlexures) -> Vec<Diagnostic> {
-    let material = &view.of.design.material;
-    let Some(bears) = material.strain_once else { return Vec::new() };
-    let strain = |f: &crate::lint::Flexure| f.even_strain(f.least_thick_mm).filter(|e| *e > bears);
-    walk::worst_of_joints(view, strain)
-        .into_iter()
-        .map(|(joint, f)| {
-            let message = format!(
-                "`{}` is strained by {:.2} % at the least; `{}` bears {:.2} % once",
-                joint.name,
-                100.0 * strain(f).unwrap_or_default(),
-                material.name,
-                100.0 * bears
-            );
-            RULE.finds(message, joint.origin)
-                .help("make the flexure thinner or longer, turn less, or take a material that bears more")
-        })
-        .collect()
+    Bears::Once.at_the_least(&RULE, view)
 }

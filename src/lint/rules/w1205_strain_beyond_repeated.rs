@@ -17,6 +17,7 @@
 //! Make it thinner or longer (`size`), turn less (see W1107), take another material, or accept it for a part that is shown rather
 //! than used: `allow W1205 "…"`. There is no repair by itself.
 use crate::lint::prelude::*;
+use crate::lint::strain::Bears;
 
 /// See the module.
 pub const RULE: Rule = Rule {
@@ -27,22 +28,5 @@ pub const RULE: Rule = Rule {
 };
 
 fn check(view: &OfFlexures) -> Vec<Diagnostic> {
-    let material = &view.of.design.material;
-    let Some(bears) = material.strain_repeated else { return Vec::new() };
-    let once = material.strain_once.unwrap_or(f64::INFINITY);
-    let strain = |f: &crate::lint::Flexure| f.even_strain(f.least_thick_mm).filter(|e| *e > bears && *e <= once);
-    walk::worst_of_joints(view, strain)
-        .into_iter()
-        .map(|(joint, f)| {
-            let message = format!(
-                "`{}` is strained by {:.2} % at the least; `{}` bears {:.2} % again and again",
-                joint.name,
-                100.0 * strain(f).unwrap_or_default(),
-                material.name,
-                100.0 * bears
-            );
-            RULE.finds(message, joint.origin)
-                .help("make the flexure thinner or longer, turn less, or take a material that bears more")
-        })
-        .collect()
+    Bears::Repeatedly.at_the_least(&RULE, view)
 }

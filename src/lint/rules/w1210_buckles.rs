@@ -29,7 +29,7 @@ const MOST: f64 = 0.5;
 fn check(view: &OfFlexures) -> Vec<Diagnostic> {
     let design = view.of.design;
     let steps = design.cycle.steps.max(1);
-    let forces = design.loads.iter().filter(|l| matches!(l.kind, LoadKind::Force { .. })).map(|l| {
+    let forces = design.all_loads().filter(|l| matches!(l.kind, LoadKind::Force { .. })).map(|l| {
         let sizes = (0..=steps).map(|s| l.size(s as f64 / steps as f64).abs());
         (sizes.fold(0.0, f64::max), l)
     });

@@ -15,28 +15,14 @@
 //!
 //! Lower the stress: longer, thinner flexures, a better rest pose (W1107), a smaller motion. There is no repair by itself.
 use crate::lint::prelude::*;
+use crate::lint::strain::Bears;
 
 /// See the module.
 pub const RULE: Rule =
     Rule { code: "W1304", name: "strain-once", severity: Severity::Warning, check: Check::Solution(check) };
 
 fn check(view: &OfSolution) -> Vec<Diagnostic> {
-    let (design, material) = (view.of.design, &view.of.design.material);
-    let Some(bears) = material.strain_once else { return Vec::new() };
-    let Some((stress, place)) = &view.simulation.worst.stress else { return Vec::new() };
-    let strain = stress / material.e_mpa;
-    if strain <= bears {
-        return Vec::new();
-    }
-    let message = format!(
-        "the largest strain is {:.2} % {}; `{}` bears {:.2} % once",
-        100.0 * strain,
-        place.told(),
-        material.name,
-        100.0 * bears
-    );
-    vec![
-        RULE.finds(message, walk::joint_of(design, place).unwrap_or(design.origin))
-            .help("take longer or thinner flexures, a better rest pose, or a smaller motion"),
-    ]
+    Bears::Once.solved(&RULE, view, |_| {
+        "take longer or thinner flexures, a better rest pose, or a smaller motion".into()
+    })
 }
