@@ -139,6 +139,11 @@ impl<'d> Problem<'d> {
         own.chain(cases).chain(["shape".to_string()]).collect()
     }
 
+    /// What an rms error of this part of its scale adds to the cost, of the track that counts most; zero where none has a scale.
+    pub fn cost_of_error(&self, part: f64) -> f64 {
+        0.5 * objectives::STEPS_OF_WEIGHTS * part * part * objectives::largest_weight_of_scaled(self.design)
+    }
+
     /// Cycles simulated so far.
     pub fn simulations(&self) -> usize {
         self.simulations.load(Ordering::Relaxed)
@@ -223,6 +228,13 @@ impl<'d> Problem<'d> {
         drop(views);
         let (x, cost, under) = (x.to_vec(), 0.0, Vec::new());
         Some(Trial { x, model, cycle, cost, terms, levels, cases, capsules, loaded, under })
+    }
+
+    /// Cost of the limits of sound rods at `x`, without simulating; none where the mechanism cannot be built.
+    pub fn shape_cost(&self, x: &[f64]) -> Option<f64> {
+        let p = self.to_parameters(x);
+        let model = Model::new(self.design, self.layout_at(&p)?, &p, self.edges, true).ok()?;
+        Some(guards::cost(&model))
     }
 
     /// The layout at parameters `p`: followed anew from the drawing where they move the geometry, always on the way of

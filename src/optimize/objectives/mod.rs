@@ -176,6 +176,17 @@ pub fn needs_links(design: &Design) -> bool {
     design.objectives.iter().any(|o| matches!(o.kind, ObjectiveKind::Collision { .. }))
 }
 
+/// Largest weight of what is to be followed with a stated scale; zero where there is none.
+pub fn largest_weight_of_scaled(design: &Design) -> f64 {
+    let weight = |o: &crate::ir::Objective| match o.kind {
+        ObjectiveKind::Track { scale_mm: Some(_), .. }
+        | ObjectiveKind::TrackAs { scale_mm: Some(_), .. }
+        | ObjectiveKind::Aim { scale_rad: Some(_), .. } => o.weight,
+        _ => 0.0,
+    };
+    design.objectives.iter().map(weight).fold(0.0, f64::max)
+}
+
 /// Derivatives of a trace's place by the n design parameters, 3 × n: as its body moves, and as it moves within.
 fn trace_rows(
     model: &Model,
