@@ -39,7 +39,7 @@ mechanism flap {
 /// Two of them, the second one turned and shifted, the third one mirrored.
 const PAIR: &str = "
 mechanism pair {
-    place one = flap at (0 mm, 0 mm)
+    place one = flap at (60 mm, 0 mm)
     place two = flap at (0 mm, 80 mm) turned 90 deg about z
     mirror three = one across yz
     export report
