@@ -3,6 +3,7 @@
 //! The way of the data, stage by stage, is described in `docs/architecture.md`;
 //! the folders of this crate carry the names used there.
 
+pub mod coupon;
 pub mod diagnostic;
 pub mod diff;
 pub mod doc;

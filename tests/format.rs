@@ -345,6 +345,22 @@ fn any_pieces(cases: u32) {
         .unwrap();
 }
 
+/// What was found at random once.
+#[test]
+fn what_is_left_at_the_end_keeps_the_end_of_its_line() {
+    for text in ["track(tip) weight 2let b=material p {\n\t", "x {\n  ", "x {\r\n\t", "x {  ", "x {"] {
+        holds(text);
+    }
+}
+
+#[test]
+fn a_power_of_a_length_is_no_area() {
+    let area = holds("mechanism m {\nrequire a <= 2 mm^2\n}\n");
+    assert!(area.contains("2 mm^2"), "{area}");
+    let power = holds("mechanism m {\nrequire a <= 2 mm ^ 2\n}\n");
+    assert!(power.contains("2 mm ^2"), "{power}");
+}
+
 #[test]
 fn pieces_at_random() {
     any_pieces(500);

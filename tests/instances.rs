@@ -14,7 +14,7 @@ use flexura::kinematics::solve_motion;
 use flexura::pipeline::{
     self, Artefact, Between, BuildOutcome, Checked, Compiler, Failed, Files, Iteration, Progress,
 };
-use flexura::pipeline::{Request, Show, Simulation, Solved, Stages};
+use flexura::pipeline::{Parts, Request, Show, Simulation, Solved, Stages};
 use nalgebra::Vector3;
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -79,11 +79,7 @@ impl Stages for Counted {
         self.optimized.set(self.optimized.get() + 1);
         self.compiler.optimize(design, start, told, cancel)
     }
-    fn parts(
-        &self,
-        assembly: &Assembly,
-        values: &[Vec<f64>],
-    ) -> Result<(Vec<Artefact>, Vec<flexura::diagnostic::Diagnostic>), Failed> {
+    fn parts(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Result<Parts, Failed> {
         self.compiler.parts(assembly, values)
     }
 }
@@ -366,7 +362,7 @@ fn a_mirrored_half_with_a_ground_in_common_is_printed_as_one_part() {
     let a = in_place(text);
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
     let compiler = Compiler::default();
-    let (artefacts, found) = compiler.parts(&a, &starts).unwrap();
+    let Parts { artefacts, diagnostics: found, .. } = compiler.parts(&a, &starts).unwrap();
     assert_eq!(found, []);
     let parts = meshes(&artefacts);
     let names: Vec<&str> = parts.iter().map(|p| p.0.as_str()).collect();
@@ -379,11 +375,11 @@ fn a_mirrored_half_with_a_ground_in_common_is_printed_as_one_part() {
     let half = check_mesh(&meshes(&half)[0].1);
     assert!(facts.volume_mm3 < 2.0 * half.volume_mm3 && facts.volume_mm3 > 1.8 * half.volume_mm3);
     // The same bytes again, and a solid to others too.
-    assert_eq!(compiler.parts(&a, &starts).unwrap().0, artefacts);
+    assert_eq!(compiler.parts(&a, &starts).unwrap().artefacts, artefacts);
     common::accepted_by_others(&artefacts);
     // Apart they are two parts of one common body, and that is told.
     let far = assembly(&text.replace("at (0 mm, 0 mm)", "at (30 mm, 0 mm)"));
-    let (artefacts, found) = compiler.parts(&far, &starts).unwrap();
+    let Parts { artefacts, diagnostics: found, .. } = compiler.parts(&far, &starts).unwrap();
     assert_eq!(found.iter().map(|d| d.code.as_str()).collect::<Vec<_>>(), ["W0640"]);
     let parts = meshes(&artefacts);
     assert_eq!(parts.len(), 2);
@@ -501,7 +497,7 @@ fn instances_in_each_others_way_are_told() {
     let text = include_str!("instances/butterfly.mech").replace("sharing base", "");
     let a = assembly(&text);
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
-    let (artefacts, found) = Compiler::default().parts(&a, &starts).unwrap();
+    let Parts { artefacts, diagnostics: found, .. } = Compiler::default().parts(&a, &starts).unwrap();
     assert_eq!(found.iter().map(|d| d.code.as_str()).collect::<Vec<_>>(), ["E0641"]);
     let names: Vec<&str> = artefacts.iter().map(|a| a.name.as_str()).collect();
     assert_eq!(names, ["butterfly_right_base.stl", "butterfly_left_base.stl"]);
@@ -516,7 +512,7 @@ fn merged_grounds_are_one_part() {
     let a = assembly(&text);
     assert_eq!(a.joined.len(), 1);
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
-    let (artefacts, found) = Compiler::default().parts(&a, &starts).unwrap();
+    let Parts { artefacts, diagnostics: found, .. } = Compiler::default().parts(&a, &starts).unwrap();
     assert_eq!(found, []);
     let parts = meshes(&artefacts);
     assert_eq!(parts.iter().map(|p| p.0.as_str()).collect::<Vec<_>>(), ["twins_board.stl"]);
@@ -538,7 +534,7 @@ fn merged_grounds_that_coincide_are_one_sound_part() {
     let a = assembly(&text);
     assert_eq!((a.joined.len(), a.instances.len()), (1, 4));
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
-    let (artefacts, found) = Compiler::default().parts(&a, &starts).unwrap();
+    let Parts { artefacts, diagnostics: found, .. } = Compiler::default().parts(&a, &starts).unwrap();
     assert_eq!(found, []);
     let [(name, mesh)] = meshes(&artefacts).try_into().unwrap();
     let facts = check_mesh(&mesh);
@@ -556,7 +552,7 @@ fn board(points: &str) -> (Vec<(String, Mesh)>, Vec<String>) {
         .replace("export stl", "export stl(assembled)");
     let a = assembly(&text);
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
-    let (artefacts, found) = Compiler::default().parts(&a, &starts).unwrap();
+    let Parts { artefacts, diagnostics: found, .. } = Compiler::default().parts(&a, &starts).unwrap();
     (meshes(&artefacts), found.into_iter().map(|d| d.code).collect())
 }
 
@@ -696,7 +692,7 @@ fn halves_with_a_moving_body_in_common_are_printed_as_one_part() {
     // An arm so wide that the leaves of one half keep clear of the other.
     let a = in_place(&CAR.replace("R = (14 mm, 24 mm)", "R = (20 mm, 24 mm)"));
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
-    let (artefacts, found) = Compiler::default().parts(&a, &starts).unwrap();
+    let Parts { artefacts, diagnostics: found, .. } = Compiler::default().parts(&a, &starts).unwrap();
     assert_eq!(found, []);
     let parts = meshes(&artefacts);
     assert_eq!(parts.iter().map(|p| p.0.as_str()).collect::<Vec<_>>(), ["car_right_chassis.stl"]);

@@ -73,6 +73,7 @@ impl Builder {
             skeleton,
             layer,
             owner: None,
+            holes: Vec::new(),
             printed: None,
             origin,
         });

@@ -139,7 +139,6 @@ fn loops_nest_and_their_bounds_may_be_parameters() {
 #[test]
 fn what_is_still_to_come_says_so_at_its_keyword() {
     for statement in [
-        "case heavy {\n        load 4 N along (0, -1, 0) on coupler at P\n    }",
         "spring back: rocker to base rate 2 N*mm",
         "stop knee from -20 deg to 20 deg",
         "tolerance r 0.1 mm",

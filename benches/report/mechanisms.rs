@@ -78,8 +78,8 @@ pub fn meshes(report: &mut Report) {
         let compiler = Compiler::default();
         let mut bytes = 0;
         let time = report.time(|| {
-            let (parts, _) = compiler.parts(&assembly, &values).unwrap_or_else(|e| panic!("{name}: {e:?}"));
-            bytes = parts.iter().map(|p| p.bytes.len()).sum();
+            let parts = compiler.parts(&assembly, &values).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+            bytes = parts.artefacts.iter().map(|p| p.bytes.len()).sum();
         });
         report.row("mesh", name, &format!("{:.1} MB of STL", bytes as f64 / 1e6), time, WHOLE);
     }

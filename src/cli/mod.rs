@@ -5,6 +5,7 @@ mod artefacts;
 mod check;
 mod commands;
 mod config;
+mod coupon;
 mod diff;
 mod doc;
 mod explain;
@@ -95,6 +96,11 @@ enum Command {
     Completions(shells::Completions),
     /// Print the manual pages
     Man(shells::Man),
+    /// Find out how stiff a material really is: a test piece to print, and what its readings give
+    #[command(
+        after_help = "Examples:\n  flexura coupon pla\n  flexura coupon pla --measured coupon/measured.csv\n  flexura coupon pa12_mjf --on mjf"
+    )]
+    Coupon(coupon::Arguments),
     /// Speak with an editor: the language server, on the standard input and output
     Lsp(lsp::Lsp),
 }
@@ -284,6 +290,7 @@ fn configured(mut cli: Cli, matches: &clap::ArgMatches) -> u8 {
         Command::Test(arguments) => test::run(arguments),
         Command::Fmt(arguments) => fmt::fmt(arguments),
         Command::New(arguments) => new::run(arguments),
+        Command::Coupon(arguments) => coupon::run(arguments),
         Command::Doc(arguments) => doc::run(arguments),
         Command::Diff(arguments) => diff::run(arguments),
         Command::Explain(arguments) => explain::explain(arguments),

@@ -102,6 +102,7 @@ impl Source<'_> {
                 StatementKind::Trace { .. } => ("trace", without("trace", &self.at(s.at))),
                 StatementKind::Output { .. } => ("output", without("output", &self.at(s.at))),
                 StatementKind::Load(_) => ("load", without("load", &self.at(s.at))),
+                StatementKind::Hole(_) => ("hole", without("hole", &self.at(s.at))),
                 StatementKind::Require { .. } => ("require", without("require", &self.at(s.at))),
                 StatementKind::Place(_) => ("place", without("place", &self.at(s.at))),
                 StatementKind::Mirror(_) => ("mirror", without("mirror", &self.at(s.at))),

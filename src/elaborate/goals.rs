@@ -20,6 +20,7 @@ pub const EXPORTS: &[&str] = &[
     "glb",
     "svg",
     "png",
+    "report",
     "arduino",
     "dynamixel",
     "micropython",
@@ -28,7 +29,7 @@ pub const EXPORTS: &[&str] = &[
     "json",
     "ros2",
 ];
-const LATER_EXPORTS: &[&str] = &["report", "step"];
+const LATER_EXPORTS: &[&str] = &["step"];
 
 impl<'a> Evaluator<'a> {
     pub(super) fn cycle(&mut self, scope: usize, sheet: &Sheet<'a>, steps: Option<usize>) -> Outcome<Cycle> {
@@ -133,13 +134,14 @@ impl<'a> Evaluator<'a> {
                 };
                 Ok(Export { kind, origin: e.at })
             }
-            plain @ ("glb" | "3mf" | "threemf" | "sheet" | "svg" | "png") => {
+            plain @ ("glb" | "3mf" | "threemf" | "sheet" | "svg" | "png" | "report") => {
                 self.arguments(name, args, &[], 0)?;
                 let kind = match plain {
                     "glb" => ExportKind::Glb,
                     "3mf" | "threemf" => ExportKind::ThreeMf,
                     "sheet" => ExportKind::Sheet,
                     "svg" => ExportKind::Svg,
+                    "report" => ExportKind::Report,
                     _ => ExportKind::Png,
                 };
                 Ok(Export { kind, origin: e.at })

@@ -167,6 +167,7 @@ impl<'a> Evaluator<'a> {
                 StatementKind::Trace { .. } => "trace",
                 StatementKind::Minimize(_) => "minimize",
                 StatementKind::Load(_) => "load",
+                StatementKind::Hole(_) => "hole",
                 StatementKind::Output { .. } => "output",
                 StatementKind::Target { .. } => "target",
                 StatementKind::Workspace(_) => "workspace",

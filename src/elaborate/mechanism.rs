@@ -253,6 +253,7 @@ pub(super) fn quote(sources: &SourceMap, at: Origin) -> String {
 fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
     for b in &mut design.bodies {
         b.skeleton.iter_mut().flat_map(|p| &mut p.position).for_each(&mut *f);
+        b.holes.iter_mut().flat_map(|h| &mut h.position).for_each(&mut *f);
     }
     for j in &mut design.joints {
         j.point.iter_mut().for_each(&mut *f);

@@ -79,6 +79,7 @@ impl<'a> Evaluator<'a> {
                 skeleton: Vec::new(),
                 layer: site.layer,
                 owner: Some(site.joint),
+                holes: Vec::new(),
                 printed: None,
                 origin: s.at,
             });

@@ -19,6 +19,7 @@ mod functions;
 mod given;
 mod goals;
 mod graph;
+mod holes;
 mod instances;
 mod known;
 mod load;

@@ -54,6 +54,7 @@ pub struct Sheet<'a> {
     pub drives: Vec<DriveText<'a>>,
     pub strings: Vec<(&'a ast::Cable, Origin)>,
     pub loads: Vec<(&'a ast::Load, Origin)>,
+    pub holes: Vec<(&'a ast::Hole, Origin)>,
     pub rests: Vec<(&'a Ident, &'a Expr, Origin)>,
     pub traces: Vec<TraceText<'a>>,
     /// Traced directions.
@@ -179,6 +180,7 @@ impl<'a> Evaluator<'a> {
                 }
             }
             StatementKind::Load(load) => sheet.loads.push((load, at)),
+            StatementKind::Hole(hole) => sheet.holes.push((hole, at)),
             StatementKind::Rest { joint, value } => sheet.rests.push((joint, value, at)),
             StatementKind::Trace { name, direction: true, point, body } => {
                 if self.name_thing(scope, name, "direction") {

@@ -86,6 +86,7 @@ impl<'a> Evaluator<'a> {
             }
         }
         self.complete_skeletons(&mut s);
+        self.holes(scope, sheet, &mut s);
         if !s.incomplete && !sheet.broken && !sheet.later {
             self.check_end_frames(&s);
         }
@@ -116,6 +117,7 @@ impl<'a> Evaluator<'a> {
             skeleton,
             layer: layer.unwrap_or(0),
             owner: None,
+            holes: Vec::new(),
             printed: None,
             origin: text.at,
         })

@@ -10,6 +10,7 @@ pub mod motion;
 mod normals;
 pub mod picture;
 pub mod plate;
+pub mod report;
 pub mod scene;
 pub mod sheet;
 pub mod stl;

@@ -1,4 +1,4 @@
-//! The print sheet, in Markdown: what goes onto the machine, how it lies there, and why.
+//! The print sheet: what goes onto the machine, how it lies there, and why. As Markdown, and in words for the report.
 
 use super::plate::{Laid, Leaf, Plate};
 use crate::geometry::Posture;
@@ -47,23 +47,88 @@ pub fn print_sheet(plate: &Plate) -> String {
 fn process(out: &mut String, part: &Laid) {
     let (p, m) = (&part.process, &part.material);
     let _ = writeln!(out, "`{}` in `{}`:\n", p.name, m.name);
-    let mut line = |what: &str, value: Option<String>| {
-        if let Some(value) = value {
-            let _ = writeln!(out, "- {what}: {value}");
-        }
-    };
-    line("layers", p.machine.layer_mm.map(|x| format!("{x} mm")));
-    line("lines", p.machine.line_mm.map(|x| format!("{x} mm wide")));
-    line("bed", p.machine.bed_mm.map(|[x, y, z]| format!("{x} × {y} × {z} mm")));
-    line("least wall", Some(format!("{} mm", p.least_wall_mm)));
-    line("clearance of moving parts", Some(format!("{} mm", p.clearance_mm)));
-    line("E the design counts on", Some(format!("{} MPa", m.e_mpa)));
+    for (what, value) in settings(part) {
+        let _ = writeln!(out, "- {what}: {value}");
+    }
     out.push('\n');
 }
 
-fn lies(out: &mut String, part: &Laid) {
+/// What is to be set on the machine, or is to be known of it.
+fn settings(part: &Laid) -> Vec<(&'static str, String)> {
+    let (p, m) = (&part.process, &part.material);
+    [
+        ("layers", p.machine.layer_mm.map(|x| format!("{x} mm"))),
+        ("lines", p.machine.line_mm.map(|x| format!("{x} mm wide"))),
+        ("bed", p.machine.bed_mm.map(|[x, y, z]| format!("{x} × {y} × {z} mm"))),
+        ("least wall", Some(format!("{} mm", p.least_wall_mm))),
+        ("clearance of moving parts", Some(format!("{} mm", p.clearance_mm))),
+        ("E the design counts on", Some(format!("{} MPa", m.e_mpa))),
+    ]
+    .into_iter()
+    .filter_map(|(what, value)| Some((what, value?)))
+    .collect()
+}
+
+/// Each process with its material, once: `polyjet in rigur`, and what is to be set.
+pub fn machines(plate: &Plate) -> Vec<(String, Vec<(&'static str, String)>)> {
+    let mut out: Vec<(String, Vec<(&'static str, String)>)> = Vec::new();
+    for part in &plate.parts {
+        let name = format!("{} in {}", part.process.name, part.material.name);
+        if out.iter().all(|(n, _)| *n != name) {
+            out.push((name, settings(part)));
+        }
+    }
+    out
+}
+
+/// A part of the sheet in words.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Told {
+    /// Name.
+    pub name: String,
+    /// As it lies, mm.
+    pub size: String,
+    /// cm³.
+    pub volume: String,
+    /// With its unit, or that the density is not stated.
+    pub mass: String,
+    /// Whether it fits on the bed; none: no bed is stated.
+    pub fits: Option<bool>,
+    /// How it lies, and why so.
+    pub lies: String,
+    /// Its flexures: path, thickness, width, what they do in the layers.
+    pub flexures: Vec<[String; 4]>,
+}
+
+/// A part in words.
+pub fn told(part: &Laid) -> Told {
+    let size = part.lying.size_mm;
+    let row = |(leaf, posture): (&Leaf, Posture)| {
+        [leaf.path.clone(), range(leaf.thickness_mm), range(leaf.width_mm), stands(posture)]
+    };
+    Told {
+        name: part.name.clone(),
+        size: format!("{:.1} × {:.1} × {:.1}", size.x, size.y, size.z),
+        volume: format!("{:.2}", part.mesh.volume_mm3() / 1000.0),
+        mass: part.mass_g().map_or("density not stated".into(), |m| format!("{m:.1} g")),
+        fits: part.fits(),
+        lies: orientation(part),
+        flexures: part.postures().map(row).collect(),
+    }
+}
+
+/// What a flexure does in the layers.
+fn stands(posture: Posture) -> String {
+    match posture {
+        Posture::Standing => "upright".to_string(),
+        Posture::Flat => "flat".to_string(),
+        Posture::Leaning(angle) => format!("leaves them by up to {:.0}°", angle.to_degrees()),
+    }
+}
+
+/// How a part lies, and why so, in two sentences.
+fn orientation(part: &Laid) -> String {
     let up = part.lying.up;
-    let _ = writeln!(out, "\n## {}\n", part.name);
     let named = |v: f64| if v.abs() < 5e-4 { 0.0 } else { v };
     let how = if up.z > 0.999_999 {
         "It lies as it is drawn".to_string()
@@ -86,8 +151,12 @@ fn lies(out: &mut String, part: &Laid) {
             "no way of laying it keeps all its {n} flexures within the layers: {k} of them leave the layers, which part there first"
         ),
     };
-    let _ = writeln!(out, "{how}; {why}. {:.0} mm² rest on the bed.", part.lying.contact_mm2);
-    if count == 0 {
+    format!("{how}; {why}. {:.0} mm² rest on the bed.", part.lying.contact_mm2)
+}
+
+fn lies(out: &mut String, part: &Laid) {
+    let _ = writeln!(out, "\n## {}\n\n{}", part.name, orientation(part));
+    if part.flexures.is_empty() {
         return;
     }
     let lines = part.process.machine.line_mm;
@@ -98,18 +167,14 @@ fn lies(out: &mut String, part: &Laid) {
         "\n| flexure | thickness, mm | width, mm | in the layers |{heading}\n| --- | --- | --- | --- |{rule}"
     );
     for (leaf, posture) in part.postures() {
-        let posture_text = match posture {
-            Posture::Standing => "upright".to_string(),
-            Posture::Flat => "flat".to_string(),
-            Posture::Leaning(angle) => format!("leaves them by up to {:.0}°", angle.to_degrees()),
-        };
         let walls = lines.map_or(String::new(), |line| format!(" {} |", wall_lines(leaf, posture, line)));
         let _ = writeln!(
             out,
-            "| {} | {} | {} | {posture_text} |{walls}",
+            "| {} | {} | {} | {} |{walls}",
             leaf.path,
             range(leaf.thickness_mm),
-            range(leaf.width_mm)
+            range(leaf.width_mm),
+            stands(posture)
         );
     }
 }

@@ -10,7 +10,9 @@ use super::weight;
 use crate::ir::{Design, LoadKind};
 use crate::kinematics::{HingeAngle, Motion};
 use crate::math::Pose;
-use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector3};
+use crate::math::elimination::Elimination;
+use crate::math::fronts::Blocks;
+use nalgebra::{DVector, SMatrix, SVector, Vector3};
 
 /// A load with its size at every state.
 #[derive(Clone, Debug)]
@@ -119,6 +121,14 @@ impl LayoutLoad {
         }
     }
 
+    /// The two bodies that second derivatives couple, if any.
+    pub(super) fn pair(&self) -> Option<[usize; 2]> {
+        match &self.kind {
+            LayoutLoadKind::Moment(turn) => Some([turn.a, turn.b]),
+            LayoutLoadKind::Force(_) | LayoutLoadKind::Gravity { .. } => None,
+        }
+    }
+
     /// The turn a moment works on, rad, on the branch nearest `near`; zero for other loads.
     pub(super) fn turn(&self, poses: &[Pose], near: f64) -> f64 {
         match &self.kind {
@@ -180,9 +190,17 @@ impl Solver {
     }
 
     /// Adds their second derivatives.
-    pub(super) fn add_load_hessian(&self, model: &Model, state: &State, out: &mut DMatrix<f64>) {
+    pub(super) fn add_load_hessian(
+        &self,
+        model: &Model,
+        state: &State,
+        order: &Elimination,
+        out: &mut Blocks,
+    ) {
         for (load, size) in model.layout.loads.iter().zip(&self.sizes) {
-            load.hessian(&state.poses, &mut |bodies, h| scatter_matrix(model, bodies, &(h * *size), out));
+            load.hessian(&state.poses, &mut |bodies, h| {
+                scatter_matrix(model, order, bodies, &(h * *size), out)
+            });
         }
     }
 

@@ -2,12 +2,14 @@
 
 use super::load::{PointForce, scatter_loads};
 use super::model::{Model, State};
-use super::saddle::{gather, scatter};
+use super::saddle::{elimination, gather, scatter};
 use crate::ir::DriveUnit;
 use crate::kinematics::Jacobian;
-use crate::math::Ldlt;
+use crate::math::elimination::Elimination;
+use crate::math::fronts::Factors;
 use crate::rod::{RodSystem, StationStrain};
 use nalgebra::DVector;
+use std::sync::Arc;
 
 /// Relative residual of an accepted state, against the largest internal force F*. Tight enough for derivatives that agree
 /// with differences to 1e-6 (`tests/equilibrium.rs`), above the rounding floor that is added to it.
@@ -72,7 +74,8 @@ impl Equilibrium {
 /// Workspace of one thread: rod systems and the factors of the last solved state.
 pub struct Solver {
     pub(super) systems: Vec<RodSystem>,
-    pub(super) factors: Option<Ldlt>,
+    pub(super) order: Arc<Elimination>,
+    pub(super) factors: Option<Factors>,
     pub(super) scale: DVector<f64>,
     pub(super) rods_positive: bool,
     pub(super) jacobian: Jacobian,
@@ -123,6 +126,7 @@ impl Solver {
         }
         Self {
             systems: model.rods.iter().map(|r| RodSystem::new(&r.rod)).collect(),
+            order: Arc::new(elimination(model)),
             factors: None,
             scale,
             rods_positive: false,

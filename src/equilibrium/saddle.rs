@@ -4,8 +4,10 @@
 use super::model::{Model, State};
 use super::newton::Solver;
 use crate::kinematics::Constraint;
-use crate::math::Ldlt;
+use crate::math::elimination::{Elimination, NODE, Pair};
+use crate::math::fronts::{Blocks, Factors};
 use nalgebra::{DMatrix, DVector, SVector};
+use std::sync::Arc;
 
 /// Lower-right regularisation δ = this · ‖J‖²/‖H‖ for redundant rows. 1e-12, 1e-10 and 1e-8 pass the same tests of
 /// states, work and sensitivities, mechanisms with redundant rows and idle freedoms among them.
@@ -57,63 +59,63 @@ impl Solver {
     pub(super) fn factor(&mut self, model: &Model, state: &State, exact: bool) -> bool {
         let n = model.layout.dofs();
         let m = model.rows();
-        let mut k = DMatrix::<f64>::zeros(n + m, n + m);
+        let order = Arc::clone(&self.order);
+        let mut k = Blocks::new(&order);
         self.rods_positive = true;
         for (rod, system) in model.rods.iter().zip(&mut self.systems) {
             let report = if exact { system.factor_unshifted() } else { system.factor() };
             self.rods_positive &= report.negative_pivots == 0;
             let (_, hessian) = system.condense();
-            scatter_matrix(model, rod.bodies, hessian, &mut k);
+            scatter_matrix(model, &order, rod.bodies, hessian, &mut k);
         }
         let mut row = 0;
         for c in &model.layout.constraints {
             let lambda = &state.lambda[row..row + c.rows()];
-            scatter_matrix(model, c.bodies(), &c.hessian(&state.poses, lambda), &mut k);
+            scatter_matrix(model, &order, c.bodies(), &c.hessian(&state.poses, lambda), &mut k);
             row += c.rows();
         }
         for (i, drive) in model.layout.drives.iter().enumerate() {
             let h = drive.joint.hessian(&state.poses) * state.lambda[row + i];
-            scatter_matrix(model, drive.joint.bodies(), &h, &mut k);
+            scatter_matrix(model, &order, drive.joint.bodies(), &h, &mut k);
         }
         for load in &self.loads {
             if let Some(first) = model.layout.bodies[load.body].first_dof {
-                let mut block = k.fixed_view_mut::<6, 6>(first, first);
-                block += load.hessian(&state.poses[load.body]);
+                let h = load.hessian(&state.poses[load.body]);
+                k.add(&order, first, first, |r, c| h[(r, c)]);
             }
         }
-        self.add_load_hessian(model, state, &mut k);
+        self.add_load_hessian(model, state, &order, &mut k);
         let target: Vec<f64> = state.drives.clone();
         self.for_each_row(model, state, &target, |row, bodies, _, _, _, gradient| {
             for (half, body) in bodies.into_iter().enumerate() {
                 if let Some(first) = model.layout.bodies[body].first_dof {
-                    for c in 0..6 {
-                        k[(n + row, first + c)] += gradient[6 * half + c];
-                    }
+                    k.add_row(&order, n + row, first, |c| gradient[6 * half + c]);
                 }
             }
         });
-        for i in 0..n + m {
-            for j in 0..=i {
-                k[(i, j)] *= self.scale[i] * self.scale[j];
+        let (mut h_norm, mut j_norm) = (f64::MIN_POSITIVE, 0.0f64);
+        k.for_each(&order, |i, j, entry| {
+            *entry *= self.scale[i] * self.scale[j];
+            if i == j && i < n {
+                h_norm = h_norm.max(entry.abs());
+            } else if (i < n) != (j < n) {
+                j_norm = j_norm.max(entry.abs());
             }
-        }
-        let h_norm = (0..n).map(|i| k[(i, i)].abs()).fold(f64::MIN_POSITIVE, f64::max);
-        let j_norm =
-            (n..n + m).flat_map(|i| (0..n).map(move |j| (i, j))).map(|ij| k[ij].abs()).fold(0.0, f64::max);
+        });
         for i in n..n + m {
-            k[(i, i)] = -REDUNDANCY * j_norm * j_norm / h_norm;
+            k.set_diagonal(&order, i, -REDUNDANCY * j_norm * j_norm / h_norm);
         }
-        let mut factors = Ldlt::new(k.clone());
-        let minimum = |f: &Ldlt| f.inertia().negative == m && f.inertia().zero == 0;
+        let mut factors = k.factor(&order);
+        let minimum = |f: &Factors| f.inertia().negative == m && f.inertia().zero == 0;
         let stable = minimum(&factors) && self.rods_positive;
         if !exact {
             let mut shift = 1e-4 * h_norm;
             while !minimum(&factors) && shift < 1e6 * h_norm {
                 let mut shifted = k.clone();
                 for i in 0..n {
-                    shifted[(i, i)] += shift;
+                    shifted.set_diagonal(&order, i, k.diagonal(&order, i) + shift);
                 }
-                factors = Ldlt::new(shifted);
+                factors = shifted.factor(&order);
                 shift *= 10.0;
             }
         }
@@ -167,23 +169,33 @@ pub(super) fn gather(model: &Model, bodies: [usize; 2], v: &DVector<f64>) -> SVe
     out
 }
 
-/// Adds a 12 × 12 matrix of two bodies into the link block.
+/// Adds a 12 × 12 matrix of two bodies into the links' blocks.
 pub(super) fn scatter_matrix(
     model: &Model,
+    order: &Elimination,
     bodies: [usize; 2],
     h: &nalgebra::SMatrix<f64, 12, 12>,
-    out: &mut DMatrix<f64>,
+    out: &mut Blocks,
 ) {
     let first = bodies.map(|b| model.layout.bodies[b].first_dof);
     for (i, row) in first.iter().enumerate() {
         for (j, column) in first.iter().enumerate() {
             if let (Some(row), Some(column)) = (row, column) {
-                for r in 0..6 {
-                    for c in 0..6 {
-                        out[(row + r, column + c)] += h[(6 * i + r, 6 * j + c)];
-                    }
-                }
+                out.add(order, *row, *column, |r, c| h[(6 * i + r, 6 * j + c)]);
             }
         }
     }
+}
+
+/// In which order links and multipliers are eliminated.
+pub(super) fn elimination(model: &Model) -> Elimination {
+    let layout = &model.layout;
+    let moving = |bodies: [usize; 2]| bodies.map(|b| layout.bodies[b].first_dof.map(|first| first / NODE));
+    let mut pairs: Vec<Pair> = model.rods.iter().map(|r| moving(r.bodies)).collect();
+    pairs.extend(layout.loads.iter().filter_map(|l| l.pair()).map(moving));
+    let constraints = layout.constraints.iter();
+    let mut rows: Vec<Pair> =
+        constraints.flat_map(|c| std::iter::repeat_n(moving(c.bodies()), c.rows())).collect();
+    rows.extend(layout.drives.iter().map(|d| moving(d.joint.bodies())));
+    Elimination::new(layout.dofs() / NODE, &pairs, &rows)
 }

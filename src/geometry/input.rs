@@ -1,7 +1,7 @@
 //! From a design and its rods at given parameters to the input of the solids.
 
 use super::layers::{guides, joint_axis, layers};
-use super::parts::{BodySolid, Bore, Eye, FlexureSolid, PartsInput};
+use super::parts::{BodySolid, Bore, Eye, FlexureSolid, HoleSolid, PartsInput};
 use super::slot::Facets;
 use crate::equilibrium::{Layout, Model};
 use crate::ir::{BodyId, Design, Joint, JointId, JointKind, Realization};
@@ -52,6 +52,15 @@ pub fn parts_input(design: &Design, layout: &Layout, model: &Model) -> PartsInpu
                     })
                     .collect(),
                 guides: guides(design, layout, b),
+                holes: body
+                    .holes
+                    .iter()
+                    .map(|hole| HoleSolid {
+                        point: layout.rest_poses[b].point(&drawn(hole.position)),
+                        axis: layout.rest_poses[b].direction(&Vector3::from(hole.axis)),
+                        diameter_mm: hole.diameter_mm,
+                    })
+                    .collect(),
             }
         })
         .collect();

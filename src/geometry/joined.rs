@@ -243,7 +243,7 @@ impl Placed<'_> {
             other => other,
         };
         let bore = |b: &BoreCut| BoreCut {
-            joint: b.joint + self.joint,
+            joint: b.joint.map(|j| j + self.joint),
             start: p.point(&b.start),
             end: p.point(&b.end),
             ..*b

@@ -55,9 +55,10 @@ pub enum Posture {
 }
 
 impl Lying {
-    /// The part on the bed, with coordinates exact in `f32`. Elsewhere they round otherwise, and slender triangles may then
-    /// cross: of the first few places beside each other, all nearer than a printer resolves, the first where the part is
-    /// sound is taken (the first of all where none is, or the part is not sound where it was made).
+    /// The part on the bed, with coordinates exact in `f32`. A part that is only moved or turned by right angles keeps its
+    /// shape to the last bit. Where another is, its coordinates round otherwise, and slender triangles may then cross: of
+    /// the first few places beside each other, all nearer than a printer resolves, the first where the part is sound is
+    /// taken (the first of all where none is, or the part is not sound where it was made).
     pub fn mesh(&self, mesh: &Mesh) -> Mesh {
         let placed = |k: usize| {
             let shift = Vector3::new(1.0, 1.0, 0.25) * (k as f64 * ASIDE_MM);
@@ -66,7 +67,8 @@ impl Lying {
             Mesh { vertices, triangles: mesh.triangles.clone() }.rounded_to_f32().sorted()
         };
         let first = placed(0);
-        if check_mesh(&first).is_sound() {
+        let exact = self.rotation.iter().all(|x| *x == 0.0 || x.abs() == 1.0);
+        if exact || check_mesh(&first).is_sound() {
             return first;
         }
         (1..PLACES).map(placed).find(|m| check_mesh(m).is_sound()).unwrap_or(first)

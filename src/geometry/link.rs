@@ -41,13 +41,13 @@ pub(super) const ROUND_MM: f64 = 0.8;
 /// Rounding of a stub's edges, mm: small, so that the flexure's clamp is as wide as the flexure.
 pub(super) const STUB_ROUND_MM: f64 = 0.5;
 /// Wall round a bore, mm; the process's least wall if that is more.
-const BORE_WALL_MM: f64 = 2.0;
+pub(super) const BORE_WALL_MM: f64 = 2.0;
 /// Kept beyond the clearance, so that rounding cannot eat it, mm.
 pub(super) const CLEAR_MM: f64 = 0.01;
 /// Next to its attachment a flexure may be nearer to its own link's bars than the clearance, mm.
 const OWN_ROOT_MM: f64 = 2.0;
 /// Sine of the angle by which axes and ends may differ in a body of layers: rounding of the rest pose.
-const FLAT: f64 = 1e-6;
+pub(super) const FLAT: f64 = 1e-6;
 /// Points nearer than this in plan are one node, mm.
 pub(super) const SAME_NODE_MM: f64 = 1.0;
 
@@ -71,8 +71,8 @@ pub enum Role {
 /// A cylinder to be taken out of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoreCut {
-    /// Joint it belongs to.
-    pub joint: usize,
+    /// Joint it belongs to; none for a hole by itself.
+    pub joint: Option<usize>,
     /// Lower end.
     pub start: Vector3<f64>,
     /// Upper end.
@@ -205,6 +205,9 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
     for guide in &body.guides {
         b.add_guide(guide, false)?;
     }
+    for hole in &body.holes {
+        b.add_hole(hole);
+    }
     for p in body.skeleton.iter().filter(|p| !b.is_risen(p)).copied().collect::<Vec<_>>() {
         b.node(p, None, Anchor::Fixed);
     }
@@ -333,7 +336,7 @@ impl Builder<'_> {
                 let low = if eye.slot.0 == 0 { FLOOR_MM - self.half() } else { middle - reach };
                 let high = if eye.slot.0 + 1 == eye.slot.1 { self.half() - FLOOR_MM } else { middle + reach };
                 let (start, end) = (eye.point + axis * low, eye.point + axis * high);
-                self.plan.bores.push(BoreCut { joint: eye.joint, start, end, diameter_mm });
+                self.plan.bores.push(BoreCut { joint: Some(eye.joint), start, end, diameter_mm });
                 if eye.slot.0 == 0 {
                     let length = self.input.height_mm - 2.0 * FLOOR_MM - c;
                     self.plan.notes.push(format!(
@@ -351,7 +354,7 @@ impl Builder<'_> {
                 };
                 let reach = layers + self.input.height_mm;
                 let (start, end) = (eye.point - axis * reach, eye.point + axis * reach);
-                self.plan.bores.push(BoreCut { joint: eye.joint, start, end, diameter_mm });
+                self.plan.bores.push(BoreCut { joint: Some(eye.joint), start, end, diameter_mm });
             }
         }
     }

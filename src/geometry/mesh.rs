@@ -55,13 +55,14 @@ impl Mesh {
         self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + offset)));
     }
 
-    /// The mesh as an STL file can hold it and every reader takes it: coordinates rounded to `f32`, near zero not finer
-    /// than a lattice of 1e-6 mm (there `f32` tells vertices apart that readers merge), vertices that coincide then merged,
-    /// triangles that collapse then dropped together with pairs of triangles that fold onto each other. A closed mesh
-    /// stays closed. Unused vertices are dropped.
+    /// The mesh as an STL file can hold it and every reader takes it: coordinates rounded to one lattice for all of it
+    /// ([`Mesh::step_mm`]), which is exact in `f32` and stays so where the mesh is moved by multiples of the step within the
+    /// size of its box, vertices that coincide then merged, triangles that collapse then dropped together with pairs of
+    /// triangles that fold onto each other. A closed mesh stays closed. Unused vertices are dropped.
     pub fn rounded_to_f32(&self) -> Mesh {
+        let step = self.step_mm();
         // Adding zero turns -0.0 into 0.0, so that both have one key.
-        let round = |x: f64| ((x * LATTICE_PER_MM).round() / LATTICE_PER_MM) as f32 + 0.0;
+        let round = |x: f64| ((x / step).round() * step) as f32 + 0.0;
         let mut merged: BTreeMap<[u32; 3], usize> = BTreeMap::new();
         let mut out = Mesh::default();
         let mut target = Vec::with_capacity(self.vertices.len());
@@ -82,6 +83,15 @@ impl Mesh {
         out.drop_folded_pairs();
         out.drop_unused_vertices();
         out
+    }
+
+    /// The finest lattice, a power of two in mm, on which `f32` holds each coordinate of the mesh, here and where the box
+    /// around it begins at the origin; not finer than that of the exact predicates, where readers merge vertices.
+    pub fn step_mm(&self) -> f64 {
+        let Some((low, high)) = self.bounding_box() else { return 1.0 / LATTICE_PER_MM };
+        let largest = low.amax().max(high.amax()).max((high - low).amax());
+        let exponent = largest.log2().ceil().max(0.0) as i32;
+        2f64.powi(exponent - f32::MANTISSA_DIGITS as i32).max(1.0 / LATTICE_PER_MM)
     }
 
     /// The same mesh in the one order its coordinates give: vertices sorted, every triangle from its

@@ -28,6 +28,7 @@ pub mod exact;
 mod field;
 pub mod gap;
 mod guide;
+mod hole;
 pub mod input;
 pub mod joined;
 mod layers;

@@ -60,8 +60,21 @@ pub struct BodySolid {
     pub eyes: Vec<Eye>,
     /// Conventional sliders.
     pub guides: Vec<Guide>,
+    /// Holes through it, each in a boss of its own.
+    pub holes: Vec<HoleSolid>,
     /// A body that a flexure's template brings along.
     pub of_flexure: bool,
+}
+
+/// A hole for a screw or a thread.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HoleSolid {
+    /// Its middle.
+    pub point: Vector3<f64>,
+    /// Unit direction.
+    pub axis: Vector3<f64>,
+    /// Diameter, mm.
+    pub diameter_mm: f64,
 }
 
 /// A body's share of a conventional slider: a square bar in a sleeve.

@@ -44,6 +44,10 @@ impl Builder<'_> {
         for guide in &body.guides {
             self.add_guide(guide, true)?;
         }
+        for hole in &body.holes {
+            self.hole_in_space(hole);
+            self.node_in_space(hole.point, Anchor::Fixed);
+        }
         let apart = |p: &Vector3<f64>| body.eyes.iter().all(|e| (e.point - p).norm() >= SAME_NODE_MM);
         for p in body.skeleton.iter().filter(|p| apart(p)) {
             self.node_in_space(*p, Anchor::Fixed);

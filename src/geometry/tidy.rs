@@ -14,18 +14,18 @@ const FLAT_MM: f64 = 5e-4;
 /// Cosine of the largest turn of a neighbouring triangle.
 const LEAST_COSINE: f64 = 0.97;
 
-/// Passes over all edges; the second finds what the first made possible.
-const PASSES: usize = 3;
+/// Passes over all edges and slivers; the next finds what the last made possible. All examples are done after five.
+const PASSES: usize = 8;
 
 /// The mesh without its short edges, as far as they can go, and without slivers.
 pub fn without_short_edges(mesh: &Mesh, limit_mm: f64) -> Mesh {
     let mut work = Work::new(mesh);
     for _ in 0..PASSES {
-        if !work.pass(limit_mm) {
+        let collapsed = work.pass(limit_mm);
+        if !work.flip_flat_triangles() && !collapsed {
             break;
         }
     }
-    work.flip_flat_triangles();
     let mut out = Mesh { vertices: work.vertices, triangles: work.triangles.into_iter().flatten().collect() };
     out.drop_unused_vertices();
     out
@@ -86,7 +86,8 @@ impl Work {
             return false;
         }
         let common = self.neighbours(i).into_iter().filter(|k| near_j.binary_search(k).is_ok()).count();
-        if common != 2 || self.fan(i).count() < 4 || self.fan(j).count() < 4 {
+        // Two vertices of three triangles each are the whole of a tetrahedron.
+        if common != 2 || self.fan(i).count() < 4 && self.fan(j).count() < 4 {
             return false;
         }
         let (ij, ji) = (self.least_cosine(i, j), self.least_cosine(j, i));
@@ -107,8 +108,9 @@ impl Work {
         true
     }
 
-    /// Replaces each sliver and the triangle at its longest edge by the two over the other diagonal.
-    fn flip_flat_triangles(&mut self) {
+    /// Replaces each sliver and the triangle at its longest edge by the two over the other diagonal; true if any went.
+    fn flip_flat_triangles(&mut self) -> bool {
+        let mut any = false;
         for t in 0..self.triangles.len() {
             let Some(ids) = self.triangles[t] else { continue };
             let length = |k: usize| (self.vertices[ids[k]] - self.vertices[ids[(k + 1) % 3]]).norm();
@@ -137,7 +139,9 @@ impl Work {
             self.fans[p].push(u);
             self.fans[b].retain(|k| *k != t);
             self.fans[a].retain(|k| *k != u);
+            any = true;
         }
+        any
     }
 
     /// Normal of a triangle, as long as twice its area.
@@ -146,14 +150,29 @@ impl Work {
         (b - a).cross(&(c - a))
     }
 
-    /// Cosine of the largest turn of a triangle when `gone` moves onto `kept`.
+    /// How high a triangle stands over its longest edge, mm.
+    fn height(&self, ids: [usize; 3]) -> f64 {
+        let longest = (0..3).map(|k| (self.vertices[ids[k]] - self.vertices[ids[(k + 1) % 3]]).norm());
+        self.normal(ids).norm() / longest.fold(f64::MIN_POSITIVE, f64::max)
+    }
+
+    /// Cosine of the largest turn of a triangle when `gone` moves onto `kept`. The normal of a sliver says nothing: what
+    /// becomes of it is compared with all that is around.
     fn least_cosine(&self, gone: usize, kept: usize) -> f64 {
+        let around: Vector3<f64> = self.fan(gone).map(|(_, ids)| self.normal(ids)).sum();
         self.fan(gone)
             .filter(|(_, ids)| !ids.contains(&kept))
             .map(|(_, ids)| {
-                let (old, new) =
-                    (self.normal(ids), self.normal(ids.map(|k| if k == gone { kept } else { k })));
-                old.dot(&new) / (old.norm() * new.norm()).max(f64::MIN_POSITIVE)
+                let moved = ids.map(|k| if k == gone { kept } else { k });
+                let cosine = |old: Vector3<f64>| {
+                    let new = self.normal(moved);
+                    old.dot(&new) / (old.norm() * new.norm()).max(f64::MIN_POSITIVE)
+                };
+                match (self.height(ids) < FLAT_MM, self.height(moved) < FLAT_MM) {
+                    (true, true) => 1.0,
+                    (true, false) if cosine(around) > 0.0 => 1.0,
+                    _ => cosine(self.normal(ids)),
+                }
             })
             .fold(1.0, f64::min)
     }

@@ -139,10 +139,26 @@ pub struct Body {
     /// text's bodies and has no skeleton. The conventional mechanism carries it with the joint's first body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub owner: Option<JointId>,
+    /// Holes through it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub holes: Vec<Hole>,
     /// What gravity needs of the printed form at some values; derived, and so no part of the design's text form.
     #[serde(skip)]
     pub printed: Option<PrintedExtra>,
     /// Declaration.
+    pub origin: Origin,
+}
+
+/// A hole through a body, for a screw or a thread.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Hole {
+    /// Its middle in the drawing pose. No point of the skeleton: frames of flexures do not depend on it.
+    pub position: ExprPoint,
+    /// Diameter, mm.
+    pub diameter_mm: f64,
+    /// Unit direction in the drawing pose.
+    pub axis: [f64; 3],
+    /// Statement.
     pub origin: Origin,
 }
 
@@ -665,6 +681,8 @@ pub enum ExportKind {
     Png,
     /// A drawing of the rest pose.
     Svg,
+    /// A page that shows all of it.
+    Report,
     /// Arduino sketch for one drive. Index into [`Design::drives`].
     Arduino(usize),
     /// Code or keyframes for these drives, all where none is named. Indices into [`Design::drives`].

@@ -1,4 +1,5 @@
-//! Linearised constraints of a mechanism: scaled sparse rows, their normal equations, and rank by singular values.
+//! Linearised constraints of a mechanism: scaled sparse rows, their normal equations (of many bodies front by front), and rank by
+//! singular values.
 //!
 //! Rows are constraint residuals (lengths divided by L) and, last, drive rows φ − α (ways divided by L). Gauges of idle
 //! freedoms stand apart: they make the normal matrix regular and are counted nowhere. Redundant rows (every planar
@@ -8,7 +9,10 @@
 use super::constraint::{Constraint, Jacobian};
 use super::mechanism::Mechanism;
 use crate::math::Pose;
+use crate::math::elimination::{Elimination, NODE};
+use crate::math::fronts::{Blocks, Factors};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
+use std::sync::Arc;
 
 /// Singular values below this part of the largest are zeros. Measured on the test mechanisms (largest value 2 to
 /// 3): zeros stay below 1e-15, the least true one is 0.06 to 0.5 away from dead points.
@@ -17,6 +21,14 @@ pub const RANK_TOLERANCE: f64 = 1e-9;
 /// Levenberg shift of the normal matrix relative to its largest diagonal: above rounding (1e-14 for 100
 /// unknowns), below the square of any singular value that matters.
 const SHIFT: f64 = 1e-13;
+
+/// Of large mechanisms, singular values below this part of the largest are looked at one by one: far above the zeros, and
+/// so few that they are quickly found. Its square must be above rounding.
+const SMALL: f64 = 1e-4;
+/// Steps of inverse iteration: each leaves 1e-5 (shift over the square of [`SMALL`]) of what is no null motion.
+const INVERSE_STEPS: usize = 4;
+/// Steps of the power method; the largest singular value is only a scale.
+const POWER_STEPS: usize = 12;
 
 /// One row: twelve entries, six for each of up to two moving bodies.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +46,7 @@ pub(super) struct Rows {
     pub residual: Vec<f64>,
     drives: usize,
     unknowns: usize,
+    order: Arc<Elimination>,
 }
 
 impl Rows {
@@ -72,7 +85,8 @@ impl Rows {
             let entry = std::array::from_fn(|k| if k < 3 { 0.0 } else { turn[k - 3] });
             gauges.push(Row { column: [mechanism.column[idle.body], None], entries: [entry, [0.0; 6]] });
         }
-        Self { rows, gauges, residual, drives: drive.len(), unknowns: mechanism.unknowns() }
+        let order = Arc::clone(&mechanism.order);
+        Self { rows, gauges, residual, drives: drive.len(), unknowns: mechanism.unknowns(), order }
     }
 
     /// Largest residual.
@@ -100,21 +114,49 @@ impl Rows {
     }
 
     /// JᵀK for the rows K of another pose.
-    pub fn product(&self, other: &Self) -> DMatrix<f64> {
+    fn product(&self, other: &Self) -> DMatrix<f64> {
         let mut out = DMatrix::zeros(self.unknowns, self.unknowns);
-        let gauges = self.gauges.iter().zip(&other.gauges);
-        for (row, col) in self.rows.iter().zip(&other.rows).chain(gauges) {
+        self.for_each_block(self.rows.len(), other, |i, left, j, right| {
+            for (c, right) in right.iter().enumerate() {
+                for (r, left) in left.iter().enumerate() {
+                    out[(i + r, j + c)] += left * right;
+                }
+            }
+        });
+        out
+    }
+
+    /// The same front by front, of the first `count` rows and all gauges.
+    fn blocks(&self, count: usize, other: &Self) -> Blocks {
+        let mut out = Blocks::new(&self.order);
+        self.for_each_block(count, other, |i, left, j, right| {
+            out.add(&self.order, i, j, |r, c| left[r] * right[c]);
+        });
+        out
+    }
+
+    fn for_each_block(
+        &self,
+        count: usize,
+        other: &Self,
+        mut f: impl FnMut(usize, &[f64; 6], usize, &[f64; 6]),
+    ) {
+        let rows = self.rows.iter().take(count).chain(&self.gauges);
+        for (row, col) in rows.zip(other.rows.iter().take(count).chain(&other.gauges)) {
             for (i, left) in row.blocks() {
                 for (j, right) in col.blocks() {
-                    for (c, right) in right.iter().enumerate() {
-                        for (r, left) in left.iter().enumerate() {
-                            out[(i + r, j + c)] += left * right;
-                        }
-                    }
+                    f(i, left, j, right);
                 }
             }
         }
-        out
+    }
+
+    /// Whether det(JᵀK) < 0 for the rows K of another pose.
+    pub fn is_reversed(&self, other: &Self) -> bool {
+        if self.order.is_dense() {
+            return self.product(other).lu().determinant() < 0.0;
+        }
+        self.blocks(self.rows.len(), other).determinant_sign(&self.order) < 0.0
     }
 
     /// The motion that keeps all rows and gauges when the residuals move by `by`: J x = −by, which must have a solution.
@@ -143,6 +185,9 @@ impl Rows {
 
     /// Factor of the (slightly shifted) normal matrix; none if an entry is not finite.
     pub fn factor(&self) -> Option<Factor> {
+        if !self.order.is_dense() {
+            return self.factor_blocks(self.rows.len());
+        }
         let mut normal = self.product(self);
         let largest = normal.diagonal().max();
         for i in 0..self.unknowns {
@@ -152,7 +197,22 @@ impl Rows {
         let pivot = |l: f64| l * l / largest;
         let least =
             (0..self.unknowns).map(|i| pivot(cholesky.l_dirty()[(i, i)])).fold(f64::INFINITY, f64::min);
-        Some(Factor { cholesky, least_pivot: least })
+        Some(Factor { kind: FactorKind::Dense(cholesky), least_pivot: least })
+    }
+
+    /// The same front by front, of the first `count` rows.
+    fn factor_blocks(&self, count: usize) -> Option<Factor> {
+        let mut normal = self.blocks(count, self);
+        let diagonal = |i| normal.diagonal(&self.order, i);
+        let largest = (0..self.unknowns).map(diagonal).fold(f64::MIN_POSITIVE, f64::max);
+        for i in 0..self.unknowns {
+            let shifted = normal.diagonal(&self.order, i) + SHIFT * largest;
+            normal.set_diagonal(&self.order, i, shifted);
+        }
+        let factors = normal.factor(&self.order);
+        let least_pivot = factors.least_pivot() / largest;
+        let definite = factors.inertia().positive == self.unknowns;
+        definite.then_some(Factor { kind: FactorKind::Fronts(factors), least_pivot })
     }
 
     /// Products of all rows with scaled motions.
@@ -166,6 +226,9 @@ impl Rows {
     /// Rank and null space of all rows, or without the drives' rows. Idle freedoms count as held.
     pub fn rank(&self, with_drives: bool) -> Rank {
         let count = self.rows.len() - if with_drives { 0 } else { self.drives };
+        if let (false, Some(rank)) = (self.order.is_dense(), self.rank_of_many(count)) {
+            return rank;
+        }
         // Zero rows make the matrix tall, so that the decomposition has all right singular vectors.
         let all = count + self.gauges.len();
         let mut dense = DMatrix::zeros(all.max(self.unknowns), self.unknowns);
@@ -184,6 +247,54 @@ impl Rows {
             None => Vec::new(),
         };
         Rank { rows: count, rank: self.unknowns - zero.len() - self.gauges.len(), null }
+    }
+
+    /// Rank of the first `count` rows with the gauges, without a dense decomposition: how many singular values are small
+    /// is told by the inertia of JᵀJ − σ², which they are by inverse iteration and the singular values of J on what that finds.
+    /// None if an entry is not finite.
+    fn rank_of_many(&self, count: usize) -> Option<Rank> {
+        let rows: Vec<&Row> = self.rows.iter().take(count).chain(&self.gauges).collect();
+        let times = |x: &DVector<f64>| DVector::from_iterator(rows.len(), rows.iter().map(|r| r.times(x)));
+        // No start may lie in a plane of symmetry.
+        let start = |k: usize, i: usize| (1.0 + (i * (k + 1)) as f64 * 0.754_877_666).sin();
+        let mut x = DVector::from_fn(self.unknowns, |i, _| start(0, i));
+        let mut largest = 0.0;
+        for _ in 0..POWER_STEPS {
+            x /= x.norm();
+            let product = times(&x);
+            largest = product.norm();
+            x.fill(0.0);
+            rows.iter().zip(product.iter()).for_each(|(row, p)| row.add_to(&mut x, *p));
+        }
+        let mut normal = self.blocks(count, self);
+        for i in 0..self.unknowns {
+            let shifted = normal.diagonal(&self.order, i) - (SMALL * largest).powi(2);
+            normal.set_diagonal(&self.order, i, shifted);
+        }
+        let small = normal.factor(&self.order).inertia().negative;
+        let factor = self.factor_blocks(count)?;
+        let mut basis = DMatrix::from_fn(self.unknowns, small, |i, k| start(k + 1, i));
+        for _ in 0..INVERSE_STEPS {
+            basis.column_iter_mut().for_each(|mut c| {
+                let solved = factor.solve(c.clone_owned());
+                c.copy_from(&solved);
+            });
+            basis = basis.qr().q();
+        }
+        let bound = RANK_TOLERANCE * largest;
+        let mut null = Vec::new();
+        if small > 0 {
+            let columns: Vec<_> = basis.column_iter().map(|c| times(&c.clone_owned())).collect();
+            let mut image = DMatrix::from_columns(&columns);
+            if image.nrows() < small {
+                image = image.insert_rows(rows.len(), small - rows.len(), 0.0);
+            }
+            let svd = image.svd(false, true);
+            let v_t = svd.v_t?;
+            let zero = (0..small).filter(|i| svd.singular_values[*i] <= bound);
+            null.extend(zero.map(|i| &basis * v_t.row(i).transpose()));
+        }
+        Some(Rank { rows: count, rank: self.unknowns - null.len() - self.gauges.len(), null })
     }
 }
 
@@ -207,15 +318,23 @@ impl Row {
 
 /// Factor of the normal matrix.
 pub(super) struct Factor {
-    cholesky: Cholesky<f64, Dyn>,
+    kind: FactorKind,
     /// Least pivot relative to the largest diagonal: about the square of the least singular value.
     pub least_pivot: f64,
+}
+
+enum FactorKind {
+    Dense(Cholesky<f64, Dyn>),
+    Fronts(Factors),
 }
 
 impl Factor {
     /// Solves in place.
     pub fn solve(&self, mut right: DVector<f64>) -> DVector<f64> {
-        self.cholesky.solve_mut(&mut right);
+        match &self.kind {
+            FactorKind::Dense(cholesky) => cholesky.solve_mut(&mut right),
+            FactorKind::Fronts(factors) => factors.solve_column(right.as_mut_slice()),
+        }
         right
     }
 }
@@ -228,6 +347,14 @@ pub(super) struct Rank {
     pub rank: usize,
     /// Orthonormal basis of the scaled motions that violate no row to first order.
     pub null: Vec<DVector<f64>>,
+}
+
+/// In which order the bodies are eliminated.
+pub(super) fn elimination(mechanism: &Mechanism) -> Elimination {
+    let moving = |bodies: [usize; 2]| bodies.map(|b| mechanism.column[b].map(|first| first / NODE));
+    let constraints = mechanism.constraints.iter().map(|(c, _)| moving(c.bodies()));
+    let pairs: Vec<_> = constraints.chain(mechanism.drives.iter().map(|d| moving(d.bodies()))).collect();
+    Elimination::new(mechanism.moving_bodies(), &pairs, &[])
 }
 
 /// Moves all bodies by scaled increments.

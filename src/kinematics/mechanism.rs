@@ -3,21 +3,24 @@
 
 use super::constraint::Constraint;
 use super::idle::{self, Idle};
+use super::linear::elimination;
 use super::pull::Pull;
 use super::value::JointValue;
 use crate::diagnostic::Diagnostic;
 use crate::ir::{Design, Drive, DriveOn, DriveUnit, JointId, JointKind, LoadKind};
+use crate::math::elimination::Elimination;
 use crate::math::{Pose, nearest_turn, twist_about};
 use nalgebra::Vector3;
+use std::sync::Arc;
 
 /// Sizes beyond which a file is taken for a mistake.
-const MAX_MOVING_BODIES: usize = 100;
+const MAX_MOVING_BODIES: usize = 2_000;
 const MAX_DRIVE_RAD: f64 = 100.0 * std::f64::consts::TAU;
 /// More steps of a cycle than elaboration allows.
 const MAX_STEPS: usize = 1_000_000;
 const MAX_DRIVE_MM: f64 = 10_000.0;
-/// Bound of (states + steps of 0.2 rad) · (moving bodies)³. Jansen's leg has 3e4 and takes 6 ms, a driven chain of a
-/// hundred links 6e7 and 30 s.
+/// Bound of (states + steps of 0.2 rad) · (work of one elimination, the cube of the number of moving bodies where all hang
+/// together). Jansen's leg has 3e4 and takes 6 ms, a hundred links that all hang together 6e7 and 30 s.
 const MAX_WORK: f64 = 1e8;
 
 /// A mechanism in its drawing pose. Scaled unknowns are (du / L, dφ) of every moving body.
@@ -43,6 +46,8 @@ pub struct Mechanism<'d> {
     pub length: f64,
     /// First scaled unknown of every body; none for ground and for bodies of flexures.
     pub(super) column: Vec<Option<usize>>,
+    /// In which order bodies are eliminated.
+    pub(super) order: Arc<Elimination>,
 }
 
 impl<'d> Mechanism<'d> {
@@ -122,10 +127,33 @@ impl<'d> Mechanism<'d> {
         let (drawing, length) = centers(design, &joint_points, &traces);
         let values = joint_values;
         let idle = Vec::new();
-        let mut made =
-            Self { design, drawing, constraints, values, drives, idle, joint_points, traces, length, column };
+        let order = Arc::new(Elimination::new(0, &[], &[]));
+        let mut made = Self {
+            design,
+            drawing,
+            constraints,
+            values,
+            drives,
+            idle,
+            joint_points,
+            traces,
+            length,
+            column,
+            order,
+        };
+        made.arrange();
+        let work = made.order.work() * (design.cycle.steps as f64 + way(design));
+        if work > MAX_WORK {
+            let message = "the cycle has too many steps, or the drives go too far, for so many links";
+            return Err(vec![Diagnostic::error("E0500", message, design.origin)]);
+        }
         made.idle = idle::find(&made);
         Ok(made)
+    }
+
+    /// Says anew in which order bodies are eliminated, after constraints were added.
+    pub(super) fn arrange(&mut self) {
+        self.order = Arc::new(elimination(self));
     }
 
     /// What counts as one of a drive in scaled equations: 1 rad, or L for a sliding one, mm.
@@ -249,11 +277,11 @@ fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
     } else if moving == 0 {
         "the mechanism has no link that could move"
     } else if moving > MAX_MOVING_BODIES {
-        "more than 100 links are not available yet"
+        "more than 2000 links are taken for a mistake"
     } else if steps == 0 {
         "a cycle has at least one step"
-    } else if steps as f64 * (moving as f64).powi(3) > MAX_WORK || steps > MAX_STEPS {
-        "the cycle has too many steps for so many links"
+    } else if steps > MAX_STEPS {
+        "the cycle has too many steps"
     } else if let Some(drive) = design.drives.iter().find(|d| !bounded(d)) {
         return Err(vec![
             Diagnostic::error(
@@ -270,21 +298,18 @@ fn consistent(design: &Design, p: &[f64]) -> Result<(), Vec<Diagnostic>> {
             Diagnostic::error("E0500", "a load has no size somewhere in the cycle", load.origin)
                 .help("t runs from 0 to 1: divide by nothing that is zero in between"),
         ]);
-    } else if work(design, moving) > MAX_WORK {
-        "the drives go too far for so many links"
     } else {
         return Ok(());
     };
     Err(vec![Diagnostic::error("E0500", problem, design.origin)])
 }
 
-/// States and steps of the longest drive's way times what each costs. A sliding drive's way counts as if L were 1 mm.
-fn work(design: &Design, moving: usize) -> f64 {
+/// Steps of the longest drive's way. A sliding drive's way counts as if L were 1 mm.
+fn way(design: &Design) -> f64 {
     let steps = design.cycle.steps;
     let at = |d: &Drive, i: usize| d.value(i as f64 / steps as f64);
     let way = |d: &Drive| (0..steps).map(|i| (at(d, i + 1) - at(d, i)).abs()).sum::<f64>() / 0.2;
-    let states = steps as f64 + design.drives.iter().map(way).fold(0.0, f64::max);
-    states * (moving as f64).powi(3)
+    design.drives.iter().map(way).fold(0.0, f64::max)
 }
 
 fn not_finite(what: &str, name: &str, origin: crate::ir::Origin) -> Diagnostic {

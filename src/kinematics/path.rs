@@ -197,7 +197,7 @@ impl<'m, 'd> Branch<'m, 'd> {
         if (&turned - &tangent).norm() > MAX_TURN * turned.norm().max(tangent.norm()) {
             return Attempt::Refused;
         }
-        if self.rows.product(&at.rows).lu().determinant() < 0.0 {
+        if self.rows.is_reversed(&at.rows) {
             if h > CHANGE_POINT_RAD {
                 return Attempt::Refused;
             }

@@ -32,6 +32,7 @@ pub(super) fn diagnose(mechanism: &Mechanism) -> Option<Diagnostic> {
             held.constraints.extend(made.into_iter().map(|c| (c, id)));
         }
     }
+    held.arrange();
     let rank = Rows::at(&held, &held.drawing, &[]).rank(true);
     if rank.null.is_empty() {
         return None;

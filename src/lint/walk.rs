@@ -69,6 +69,10 @@ pub fn expressions<'a>(s: &'a Statement, f: &mut dyn FnMut(&'a Expr)) {
             Load::Moment { size, about, .. } => [size, about].into_iter().for_each(f),
             Load::Force { size, along, point, .. } => [size, along, point].into_iter().for_each(f),
         },
+        K::Hole(hole) => {
+            [&hole.diameter, &hole.point].into_iter().for_each(&mut *f);
+            hole.along.iter().for_each(f);
+        }
         K::Rod(r) => {
             for end in [&r.from, &r.to] {
                 f(&end.position);

@@ -42,6 +42,21 @@ impl Ldlt {
         self.inertia
     }
 
+    /// Least size of a pivot; of a 2×2 one about that of its lesser eigenvalue.
+    pub fn least_pivot(&self) -> f64 {
+        let a = &self.factors;
+        let size = |k: usize| match (self.pivots[k].1, k.checked_sub(1).is_some_and(|b| self.pivots[b].1)) {
+            (true, _) => {
+                let (d, e, f) = (a[(k, k)], a[(k + 1, k)], a[(k + 1, k + 1)]);
+                ((d / e) * (f / e) - 1.0).abs() * e.abs()
+            }
+            // Counted with the row before.
+            (false, true) => f64::INFINITY,
+            (false, false) => a[(k, k)].abs(),
+        };
+        (0..a.nrows()).map(size).fold(f64::INFINITY, f64::min)
+    }
+
     fn factor(&mut self) {
         let n = self.factors.nrows();
         let a = &mut self.factors;
@@ -96,7 +111,7 @@ impl Ldlt {
     }
 
     /// Solves for `N` right-hand sides in place, of which `b` has the rows.
-    fn solve_rows<const N: usize>(&self, b: &mut [[f64; N]]) {
+    pub(super) fn solve_rows<const N: usize>(&self, b: &mut [[f64; N]]) {
         let a = &self.factors;
         let n = a.nrows();
         let mut k = 0;

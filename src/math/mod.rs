@@ -2,6 +2,8 @@
 
 pub mod banded;
 pub mod dual;
+pub mod elimination;
+pub mod fronts;
 mod ldlt;
 pub mod polyline;
 mod pose;

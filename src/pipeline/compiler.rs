@@ -6,11 +6,11 @@ use super::gravity;
 use super::joined::{self, Solid};
 use super::products::{self, Built};
 use super::progress::Iteration;
-use super::report::{Artefact, Place, Worst};
+use super::report::{Place, Worst};
 use super::scene::Moving;
 use super::solids;
 use super::stability;
-use super::stages::{Between, Checked, Failed, Response, Simulation, Solved, Stages};
+use super::stages::{Between, Checked, Failed, Parts, Response, Simulation, Solved, Stages};
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
@@ -178,11 +178,7 @@ impl Stages for Compiler {
         })
     }
 
-    fn parts(
-        &self,
-        assembly: &Assembly,
-        values: &[Vec<f64>],
-    ) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
+    fn parts(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Result<Parts, Failed> {
         let mut found = Vec::new();
         let (mut built, mut moving) = (Vec::new(), Vec::new());
         for (d, (design, values)) in assembly.designs.iter().zip(values).enumerate() {
@@ -205,9 +201,9 @@ impl Stages for Compiler {
         let (parts, findings) = joined::parts(assembly, &built)?;
         found.extend(findings);
         let whole = Built { assembly, solids: &built, moving: &moving, printed: &parts };
-        let (artefacts, findings) = products::artefacts(&whole);
-        found.extend(findings);
-        Ok((artefacts, found))
+        let made = products::artefacts(&whole);
+        found.extend(made.diagnostics);
+        Ok(Parts { diagnostics: found, ..made })
     }
 }
 

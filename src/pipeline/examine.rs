@@ -105,9 +105,10 @@ fn run(
     if extent >= Extent::Volume && assembly.exports.iter().any(|e| e.export.kind == ExportKind::Stl) {
         // What cannot be printed is no finding here: a build tells it.
         let mut solids = assembly.clone();
-        solids.exports.retain(|e| e.export.kind == ExportKind::Stl);
+        // Without exports each part comes once, whatever is asked for.
+        solids.exports.clear();
         let parts = stages.parts(&solids, &found.values).ok();
-        found.volume_mm3 = parts.map(|(parts, _)| parts.iter().map(|p| volume_mm3(&p.bytes)).sum());
+        found.volume_mm3 = parts.map(|p| p.artefacts.iter().map(|p| volume_mm3(&p.bytes)).sum());
     }
     Some(())
 }

@@ -85,6 +85,11 @@ impl Fingerprint {
         }
         Self { digest: digest(walk.text.as_bytes()), places: walk.places }
     }
+
+    /// Of the same, where something else is shown as well.
+    pub fn with(self, also: &str) -> Self {
+        Self { digest: digest(format!("{}\n{also}", self.digest).as_bytes()), ..self }
+    }
 }
 
 /// Canonical text of a design: sorted keys, numbered places.

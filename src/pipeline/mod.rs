@@ -12,6 +12,7 @@ mod lay;
 mod lints;
 mod manifest;
 mod measure;
+mod page;
 mod products;
 mod progress;
 mod reach;
@@ -32,7 +33,7 @@ pub use report::{
     Seconds, StressMeasures, TraceMeasures, Worst,
 };
 pub use stability::{DriveValues, LimitPoint, RestState, SnapThrough, Stability};
-pub use stages::{Between, Checked, Failed, Made, NothingMade, Response, Simulation, Solved, Stages};
+pub use stages::{Between, Checked, Failed, Made, NothingMade, Parts, Response, Simulation, Solved, Stages};
 
 use crate::diagnostic::{Diagnostic, Severity};
 pub use crate::elaborate::{FileError, Files};
@@ -118,6 +119,7 @@ fn run_build(
     let assembly = front_end(request, stages, files, out);
     clock.stop(&mut out.seconds.check);
     let assembly = assembly?;
+    let checked = out.diagnostics.len();
     // What is denied and known by now need not be solved first.
     if lints::denied(request, out) {
         return None;
@@ -133,7 +135,10 @@ fn run_build(
 
     // Nothing to do where all of it has been done.
     let clock = Clock::start(progress, Stage::Emit);
-    let fingerprint = manifest::Fingerprint::of(&assembly, &values);
+    let mut fingerprint = manifest::Fingerprint::of(&assembly, &values);
+    if page::is_asked(&assembly) {
+        fingerprint = fingerprint.with(&page::told_early(request, out, checked));
+    }
     let recalled = if request.fresh { None } else { manifest::recall(made, &request.source, &fingerprint) };
     clock.stop(&mut out.seconds.emit);
     if let Some(recalled) = recalled {
@@ -150,10 +155,12 @@ fn run_build(
     let clock = Clock::start(progress, Stage::Simulate);
     let start = |d: &Design| stages.simulate(d, &starts(d));
     let before: Option<Vec<Simulation>> = assembly.designs.iter().map(|d| start(d).ok()).collect();
-    out.before = before.map(|b| {
+    let before = before.map(|b| {
         let started: Vec<Vec<f64>> = assembly.designs.iter().map(starts).collect();
         let between = stages.between(&assembly, &started);
-        assembly::measure_all(&assembly, &assembly::place(&assembly, &b), &between)
+        let placed = assembly::place(&assembly, &b);
+        out.before = Some(assembly::measure_all(&assembly, &placed, &between));
+        page::Motion { whole: assembly::combine(&assembly, placed.clone(), &between), placed }
     });
     let after = assembly.designs.iter().zip(&values);
     let after = after.map(|(d, v)| stages.simulate(d, v)).collect::<Result<Vec<Simulation>, Failed>>();
@@ -170,17 +177,26 @@ fn run_build(
 
     // Values to files.
     let clock = Clock::start(progress, Stage::Mesh);
+    let mut shown = None;
     if assembly.exports.iter().any(|e| e.export.kind.of_solids())
-        && let Some((parts, found)) = keep(stages.parts(&assembly, &values), &mut out.diagnostics)
+        && let Some(parts) = keep(stages.parts(&assembly, &values), &mut out.diagnostics)
     {
-        out.artefacts.extend(parts);
-        tell_once(found, out);
+        out.artefacts.extend(parts.artefacts);
+        shown = parts.shown;
+        tell_once(parts.diagnostics, out);
         lints::parts(&assembly, out);
     }
     clock.stop(&mut out.seconds.mesh);
     let clock = Clock::start(progress, Stage::Emit);
     code::emit(&assembly, &values, stages, out);
     out.reached = Reached::Parts;
+    if let Some((scene, plate)) = &shown {
+        let whole = assembly::combine(&assembly, placed.clone(), &between);
+        let after = page::Motion { whole, placed };
+        let (solutions, values) = (&solutions, &values);
+        let known = page::Known { assembly: &assembly, solutions, values, before, after, scene, plate };
+        page::emit(request, &known, stages, out);
+    }
     let manifest = manifest::write(out, told, &fingerprint);
     out.manifest = manifest.map(|bytes| Artefact { name: manifest::name(&request.source), bytes });
     clock.stop(&mut out.seconds.emit);

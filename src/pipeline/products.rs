@@ -4,6 +4,7 @@ use super::joined::{Printed, Solid};
 use super::lay;
 use super::report::Artefact;
 use super::scene::{Moving, scene};
+use super::stages::Parts;
 use crate::diagnostic::Diagnostic;
 use crate::emit::drawing::svg_drawing;
 use crate::emit::glb::glb_bytes;
@@ -36,7 +37,7 @@ pub struct Built<'a> {
 type Written = Result<Artefact, (&'static str, &'static str, String)>;
 
 /// Every export of parts that is asked for, in the order of the text, each kind once; and what is to say of them.
-pub fn artefacts(built: &Built<'_>) -> (Vec<Artefact>, Vec<Diagnostic>) {
+pub fn artefacts(built: &Built<'_>) -> Parts {
     let Built { assembly, solids, moving, printed } = *built;
     let (shown, laid) = (OnceCell::new(), OnceCell::new());
     let scene = || shown.get_or_init(|| scene(assembly, moving, solids, printed));
@@ -70,10 +71,13 @@ pub fn artefacts(built: &Built<'_>) -> (Vec<Artefact>, Vec<Diagnostic>) {
             }
         }
     }
+    // The report is written when all else is known.
+    let reported = assembly.exports.iter().any(|e| e.export.kind == ExportKind::Report);
+    let shown = reported.then(|| (scene().clone(), plate().clone()));
     if let Some(plate) = laid.get() {
         found.extend(lay::findings(assembly, plate, printed));
     }
-    (out, found)
+    Parts { artefacts: out, diagnostics: found, shown }
 }
 
 fn files<'s>(
@@ -111,6 +115,6 @@ fn files<'s>(
             let bytes = Ok(svg_drawing(scene()).into_bytes());
             vec![file(format!("{name}.svg"), bytes, "E0647", "drawing")]
         }
-        ExportKind::Arduino(_) | ExportKind::Code(..) => Vec::new(),
+        ExportKind::Report | ExportKind::Arduino(_) | ExportKind::Code(..) => Vec::new(),
     }
 }

@@ -153,7 +153,7 @@ pub fn scene(assembly: &Assembly, moving: &[Moving], solids: &[Solid], printed: 
                 part,
                 mesh: mesh.clone(),
                 center: instance.placement.point(center),
-                states: frames(instance, &m.poses, *b),
+                states: frames(instance, &m.poses, *b, center),
             });
         }
         for (i, f) in &printed.flexures {
@@ -187,12 +187,15 @@ pub fn scene(assembly: &Assembly, moving: &[Moving], solids: &[Solid], printed: 
                     .collect(),
             }
         }));
-        out.ghosts.extend(m.ghosts.iter().map(|(b, bars)| Ghost {
-            name: m.names.get(*b).map(|n| instance.of(n)).unwrap_or_default(),
-            bars: bars.iter().map(|bar| bar.map(|x| p.point(&x))).collect(),
-            radius_mm: m.ghost_radius_mm,
-            center: m.centers.get(*b).map(|c| p.point(c)).unwrap_or_default(),
-            states: frames(instance, &m.conventional, *b),
+        out.ghosts.extend(m.ghosts.iter().filter_map(|(b, bars)| {
+            let center = m.centers.get(*b)?;
+            Some(Ghost {
+                name: m.names.get(*b).map(|n| instance.of(n)).unwrap_or_default(),
+                bars: bars.iter().map(|bar| bar.map(|x| p.point(&x))).collect(),
+                radius_mm: m.ghost_radius_mm,
+                center: p.point(center),
+                states: frames(instance, &m.conventional, *b, center),
+            })
         }));
         out.traces.extend(m.traces.iter().map(|t| Trace {
             name: instance.of(&t.name),
@@ -225,10 +228,11 @@ fn ordered<'a, T>(instance: &'a Instance, states: &'a [T]) -> impl Iterator<Item
 }
 
 /// Where a body's centre is and how it is turned, in the assembly.
-fn frames(instance: &Instance, poses: &[Vec<Pose>], body: usize) -> Vec<Frame> {
+fn frames(instance: &Instance, poses: &[Vec<Pose>], body: usize, center: &Vector3<f64>) -> Vec<Frame> {
     let turn = instance.placement.matrix();
+    // The pose's own centre may be another one: that of the conventional motion is the origin.
     let frame = |pose: &Pose| Frame {
-        origin: instance.placement.point(&pose.point(&pose.center)),
+        origin: instance.placement.point(&pose.point(center)),
         rotation: turn * pose.rotation * turn.transpose(),
     };
     ordered(instance, poses).filter_map(|state| state.get(body)).map(frame).collect()

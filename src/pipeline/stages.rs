@@ -8,6 +8,8 @@ use super::stability::Stability;
 use crate::diagnostic::{Diagnostic, SourceMap};
 use crate::elaborate::{Files, OwnFile};
 use crate::emit::csv::MotionTable;
+use crate::emit::plate::Plate;
+use crate::emit::scene::Scene;
 use crate::ir::{Assembly, Design, Solution};
 use crate::kinematics::Motion;
 use std::sync::atomic::AtomicBool;
@@ -92,6 +94,17 @@ pub struct Response {
     pub traces_mm: Vec<Vec<[f64; 3]>>,
     /// Each traced direction.
     pub directions: Vec<Vec<[f64; 3]>>,
+}
+
+/// The printed parts as files, and as what a report shows.
+#[derive(Clone, Debug, Default)]
+pub struct Parts {
+    /// Files of parts and motion.
+    pub artefacts: Vec<Artefact>,
+    /// Findings that do not stop the work.
+    pub diagnostics: Vec<Diagnostic>,
+    /// The mechanism in motion and its parts on the bed, where a report is asked for.
+    pub shown: Option<(Scene, Plate)>,
 }
 
 /// What already stands in the output folder.
@@ -181,16 +194,12 @@ pub trait Stages {
         cancel: &AtomicBool,
     ) -> Result<Solved, Failed>;
 
-    /// The files of printed parts that the assembly's exports ask for, and findings that do not stop the work; where they
-    /// ask for none, an STL a part in the rest pose of the assembly. `values` are those of each design.
+    /// The files of printed parts that the assembly's exports ask for; where they ask for none, an STL a part in the
+    /// rest pose of the assembly. `values` are those of each design.
     ///
     /// # Errors
     /// Where no closed solid comes out.
-    fn parts(
-        &self,
-        assembly: &Assembly,
-        values: &[Vec<f64>],
-    ) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed>;
+    fn parts(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Result<Parts, Failed>;
 
     /// An STL a printed part of a mechanism by itself, in its own coordinates.
     ///
@@ -198,6 +207,6 @@ pub trait Stages {
     /// Where no closed solid comes out.
     fn mesh(&self, design: &Design, values: &[f64]) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
         let assembly = Assembly { exports: Vec::new(), ..Assembly::of(design.clone()) };
-        self.parts(&assembly, &[values.to_vec()])
+        self.parts(&assembly, &[values.to_vec()]).map(|p| (p.artefacts, p.diagnostics))
     }
 }

@@ -162,9 +162,9 @@ impl Stages for Toy {
         Ok(Solved { solution, interrupted, diagnostics: Vec::new() })
     }
 
-    fn parts(&self, _: &Assembly, values: &[Vec<f64>]) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
+    fn parts(&self, _: &Assembly, values: &[Vec<f64>]) -> Result<Parts, Failed> {
         let part = Artefact { name: "toy.stl".into(), bytes: values[0][0].to_le_bytes().to_vec() };
-        Ok((vec![part], Vec::new()))
+        Ok(Parts { artefacts: vec![part], ..Parts::default() })
     }
 }
 

@@ -243,6 +243,8 @@ pub enum StatementKind {
     String(Box<Cable>),
     /// `load …`
     Load(Box<Load>),
+    /// `hole DIAMETER on BODY at P [along D]`
+    Hole(Box<Hole>),
     /// `rod NAME { [axis second] from a at … along … to b at … along … section … }` (templates only)
     Rod(Box<Rod>),
     /// `place NAME = MECHANISM [{ overrides }] at P [turned A about D] [scale = K] [merging GROUND into BODY]…`
@@ -291,6 +293,19 @@ pub struct Cable {
     pub to: Ident,
     /// Through which points of that body, in order.
     pub via: Vec<Expr>,
+}
+
+/// A hole through a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hole {
+    /// Diameter.
+    pub diameter: Expr,
+    /// The body.
+    pub body: Ident,
+    /// Where.
+    pub point: Expr,
+    /// Its direction.
+    pub along: Option<Expr>,
 }
 
 /// A load on the mechanism.

@@ -313,6 +313,7 @@ fn kind(rule: Rule) -> Kind {
         Rule::st_string => Kind::String,
         Rule::via => Kind::Via,
         Rule::st_load => Kind::Load,
+        Rule::st_hole => Kind::Hole,
         Rule::load_gravity => Kind::Gravity,
         Rule::load_moment => Kind::Moment,
         Rule::load_force => Kind::Force,

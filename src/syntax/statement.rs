@@ -1,8 +1,8 @@
 //! Statements: concrete tree to [`ast::StatementKind`].
 
 use super::ast::{
-    Allow, At, Cable, Compare, Expr, Ident, Joint, Load, Profile, Rod, RodEnd, Statement, StatementKind,
-    TemplateUse, Term,
+    Allow, At, Cable, Compare, Expr, Hole, Ident, Joint, Load, Profile, Rod, RodEnd, Statement,
+    StatementKind, TemplateUse, Term,
 };
 use super::lower::Lower;
 use super::tree::{Kind, Node};
@@ -86,6 +86,12 @@ impl Lower<'_> {
             },
             Kind::String => StatementKind::String(Box::new(self.string(node)?)),
             Kind::Load => StatementKind::Load(Box::new(self.load(node)?)),
+            Kind::Hole => {
+                let mut values = self.values(node).into_iter();
+                let (diameter, point) = (values.next()?, values.next()?);
+                let hole = Hole { diameter, body: self.ident(node)?, point, along: values.next() };
+                StatementKind::Hole(Box::new(hole))
+            }
             Kind::Allow => StatementKind::Allow(self.allow(node)?),
             Kind::Assert => StatementKind::Assert(Box::new(self.assertion(node)?)),
             Kind::Variant => StatementKind::Variant(Box::new(self.variant(node)?)),

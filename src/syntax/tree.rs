@@ -97,6 +97,7 @@ pub enum Kind {
     String,
     Via,
     Load,
+    Hole,
     Gravity,
     Moment,
     Force,

@@ -136,6 +136,7 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "case" => "case NAME {",
         "string" => "string NAME: BODY at POINT to BODY via POINT",
         "allow" => "allow CODE \"REASON\"",
+        "hole" => "hole DIAMETER on BODY at POINT",
         "load" => "load FORCE along DIRECTION on BODY at POINT",
         _ => return None,
     })

@@ -50,6 +50,11 @@ pub(super) fn column(node: &Node, at: usize, source: &str) -> Option<Column> {
         }
         (Kind::Field, Kind::Punctuation) => new(0, "field"),
         (Kind::Drive | Kind::Rest, Kind::Ident) if at < 3 => new(0, "drive"),
+        (Kind::Hole, Kind::Keyword) if at > 0 => match text {
+            "on" => new(0, "hole"),
+            "at" => new(1, "hole"),
+            _ => new(2, "hole"),
+        },
         (Kind::Load, Kind::Gravity | Kind::Moment | Kind::Force) => new(0, "drive"),
         (Kind::Drive, Kind::Range | Kind::By | Kind::Keys) => new(1, "drive"),
         (Kind::Rest, Kind::Keyword) if at > 0 => new(1, "drive"),

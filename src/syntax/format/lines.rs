@@ -259,7 +259,11 @@ impl<'a> Builder<'a> {
 /// No space between the child and what stands before it.
 fn tight_before(node: &Node, at: usize, text: &str) -> bool {
     match text {
-        "," | ")" | ":" | "^" | "[" | "]" => true,
+        "," | ")" | ":" | "[" | "]" => true,
+        // `2 mm ^2` is a power of a length, `2 mm^2` an area.
+        "^" => {
+            node.kind != Kind::Power || node.first(Kind::Number).is_none_or(|n| n.first(Kind::Unit).is_none())
+        }
         "(" => node.kind == Kind::Call,
         "." => true,
         _ => match node.kind {

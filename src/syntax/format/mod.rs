@@ -38,7 +38,10 @@ pub fn format(file: u32, text: &str) -> Result<Formatted, Box<Diagnostic>> {
     let end = if text.contains("\r\n") { "\r\n" } else { "\n" };
     let mark = if text.starts_with('\u{FEFF}') { "\u{FEFF}" } else { "" };
     // A mark behind empty lines is none: at the very start it would become one.
-    let printed = layout::print(lines, end, !text.ends_with(['\n', '\r']));
+    // What ends with spaces only has an end of its own, too.
+    let behind = text.trim_end_matches(lines::BLANK).len();
+    let open = !text.get(behind..).unwrap_or("").contains(['\n', '\r']);
+    let printed = layout::print(lines, end, open);
     let first = if mark.is_empty() && printed.starts_with('\u{FEFF}') { end } else { mark };
     let new = format!("{first}{printed}");
     match difference(&parse.tree, text, &super::parse(file, &new).tree, &new) {
