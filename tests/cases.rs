@@ -235,3 +235,38 @@ fn requirements_of_a_case_do_not_change_the_lock() {
     assert_ne!(digest(""), digest("minimize { stress() }"));
     assert_ne!(digest(""), digest("load gravity y"));
 }
+
+/// Euler's load of a column held at its foot, N: π² EI / (2 L)².
+fn euler_n() -> f64 {
+    let ei = 1500.0 * std::f64::consts::PI / 4.0 * 0.4f64.powi(3) * 2.5;
+    std::f64::consts::PI.powi(2) * ei / (2.0 * LENGTH_MM).powi(2)
+}
+
+#[test]
+fn a_column_buckles_under_eulers_load() {
+    /// The rod's 20 edges; measured 0.1 %.
+    const AGREES: f64 = 5e-3;
+    let design = cantilever(
+        "load 0.1 N * t along (-1, 0, 0) on tip at T
+         require min(buckling()) >= 5
+         case more { load 0.1 N * t along (-1, 0, 0) on tip at T
+             require min(buckling()) >= 3 }
+         case pulled { load 0.3 N along x on tip at T
+             require min(buckling()) >= 10 }
+         case fallen { load 0.7 N along (-1, 0, 0) on tip at T
+             require min(buckling()) >= 1 }",
+    );
+    let simulation = simulated(&design);
+    let mut found = Vec::new();
+    let results = check_requirements(&design, &simulation, &mut found);
+    let euler = euler_n();
+    for (result, load) in results.iter().zip([0.1, 0.2, f64::MIN_POSITIVE, 0.8]) {
+        let (value, wanted) = (result.value.unwrap(), (euler / load).min(10.0));
+        assert!((value / wanted - 1.0).abs() < AGREES, "{}: {value}, Euler {wanted}", result.text);
+    }
+    assert_eq!(results.iter().map(|r| r.pass).collect::<Vec<_>>(), [true, false, true, false]);
+    // Nothing loads it at the beginning; by then the factor falls as the load grows.
+    let [first, second, .., last] = simulation.load_factors.as_slice() else { panic!() };
+    assert!(*first == 10.0 && *second == 10.0 && *last < 6.0);
+    assert!(simulated(&cantilever(PUSH)).load_factors.is_empty(), "only where it is asked for");
+}

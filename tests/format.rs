@@ -373,6 +373,62 @@ fn many_pieces_at_random() {
     }
 }
 
+/// Numbers that look random, the same in every run (xorshift, Marsaglia 2003).
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 % n.max(1) as u64) as usize
+    }
+
+    /// A place between two characters.
+    fn cut(&mut self, text: &str) -> usize {
+        let at = self.below(text.len() + 1);
+        (0..=at).rev().find(|i| text.is_char_boundary(*i)).unwrap_or(0)
+    }
+}
+
+/// Shipped files, changed as a fuzzer changes them: pieces taken out, doubled, moved, brought from other files, and signs in between.
+fn mutated(rounds: usize) {
+    const SIGNS: [&str; 12] = ["{", "}", "(", ")", "\"", "//", "\n", "\r", "..", " free ", "µ", "\u{0}"];
+    let texts: Vec<String> = examples().into_iter().map(|f| f.1).collect();
+    let mut dice = Dice(0x6d65_6368);
+    for _ in 0..rounds {
+        let mut text = texts[dice.below(texts.len())].clone();
+        for _ in 0..=dice.below(4) {
+            let other = &texts[dice.below(texts.len())];
+            let (a, b) = (dice.cut(other), dice.cut(other));
+            let brought = other[a.min(b)..a.max(b).min(other.len())].to_string();
+            let (a, b) = (dice.cut(&text), dice.cut(&text));
+            let (a, b) = (a.min(b), a.max(b));
+            match dice.below(5) {
+                0 => drop(text.drain(a..b)),
+                1 => text.insert_str(a, &text[a..b].to_string()),
+                2 => text.insert_str(a, SIGNS[dice.below(SIGNS.len())]),
+                3 => text.replace_range(a..b, &brought),
+                _ => text.truncate(b),
+            }
+        }
+        assert_eq!(parse(0, &text).tree.print(&text), text);
+        holds(&text);
+    }
+}
+
+#[test]
+fn shipped_files_changed_at_random() {
+    mutated(100);
+}
+
+#[test]
+fn shipped_files_changed_very_often() {
+    if !skipped() {
+        mutated(20_000);
+    }
+}
+
 proptest! {
     #![proptest_config(many(300))]
 

@@ -8,9 +8,11 @@ use common::skipped;
 use flexura::elaborate::{FileError, std_source};
 use flexura::lsp::server::{Connection, serve};
 use flexura::lsp::{Host, complete, edits, outline, signature, space};
+use flexura::syntax::starting_words;
+use flexura::syntax::tree::Kind;
 use lsp_server::{Message, Notification, Request, RequestId};
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -366,7 +368,14 @@ fn what_is_proposed_fits_the_place() {
         )
     };
     for (line, with, without) in [
-        ("|", &["hinge", "minimize", "param"][..], &["rod", "mechanism"][..]),
+        (
+            "|",
+            &["hinge", "minimize", "param", "for", "variant", "case", "workspace"][..],
+            &["rod", "spring"][..],
+        ),
+        ("case push {\n        |\n    }", &["load", "minimize", "require"], &["hinge", "for"]),
+        ("for i in 0 .. 2 {\n        |\n    }", &["place", "export"], &["load"]),
+        ("export |", &["stl", "3mf", "glb", "ros2"], &["report"]),
         ("hinge h: |", &["base", "arm"], &["P", "r"]),
         ("hinge h: base to |", &["base", "arm"], &["P"]),
         ("hinge h: base to arm at P as |", &["leaf"], &["rigur", "m"]),
@@ -570,5 +579,51 @@ fn hundreds_of_keystrokes() {
 fn ten_thousand_keystrokes() {
     if !skipped() {
         replay(10_000);
+    }
+}
+
+/// Words in quotes of the rules of the grammar whose names `wanted` picks.
+fn grammar_words(wanted: impl Fn(&str) -> bool) -> BTreeSet<String> {
+    let grammar = include_str!("../grammar/mech.pest");
+    let mut words = BTreeSet::new();
+    let mut inside = false;
+    for line in grammar.lines() {
+        let rule = line.split(' ').next().unwrap_or("");
+        if line.contains("= @{") || line.contains("= _{") {
+            inside = wanted(rule);
+        }
+        if inside {
+            let quoted = line.split('"').skip(1).step_by(2);
+            words.extend(quoted.filter(|w| w.chars().all(|c| c.is_ascii_lowercase())).map(String::from));
+        }
+        inside &= !line.trim_end().ends_with('}');
+    }
+    words
+}
+
+#[test]
+fn the_lists_of_words_are_the_grammars() {
+    let starts = |rule: &str| matches!(rule, "reserved_word" | "joint_word");
+    let listed = [Kind::File, Kind::Mechanism, Kind::Flexure].into_iter().flat_map(starting_words);
+    let listed: BTreeSet<String> = listed.map(String::from).collect();
+    assert_eq!(listed, grammar_words(starts));
+    let later = grammar_words(|rule| rule == "later_word");
+    assert!(later.contains("spring") && listed.is_disjoint(&later));
+}
+
+/// Where no language server gives colours, the editors' own files do: no word may be missing there.
+#[test]
+fn every_word_of_the_grammar_is_in_the_editors_files() {
+    let wanted =
+        |rule: &str| rule.starts_with("kw_") || matches!(rule, "reserved_word" | "joint_word" | "later_word");
+    let words = grammar_words(wanted);
+    assert!(words.len() > 80 && words.contains("case") && words.contains("weight"), "{words:?}");
+    for (name, text) in [
+        ("Neovim", include_str!("../editors/neovim/syntax/mech.vim")),
+        ("VS Code", include_str!("../editors/vscode/syntaxes/mech.tmLanguage.json")),
+    ] {
+        let known: BTreeSet<&str> = text.split(|c: char| !c.is_ascii_lowercase()).collect();
+        let missing: Vec<&String> = words.iter().filter(|w| !known.contains(w.as_str())).collect();
+        assert!(missing.is_empty(), "{name}: {missing:?}");
     }
 }

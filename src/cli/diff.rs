@@ -23,7 +23,7 @@ const MOST_PERCENT: f64 = 1000.0;
 ///
 /// A and B are files or `REVISION:PATH` as in `git show`; `flexura diff REVISION FILE` compares a file with what it was,
 /// `flexura diff FILE` with the newest commit. Each version is simulated with the values of its own lock where this belongs
-/// to it, else with its own start. As a program for `git diff` it takes the arguments git gives
+/// to it, else with its own start; so is each of its variants that both have. As a program for `git diff` it takes the arguments git gives
 /// (docs/version-control.md).
 #[derive(Debug, Args)]
 pub struct Diff {
@@ -148,40 +148,81 @@ fn by_lines(old: &str, new: &str) -> u8 {
 }
 
 /// Examines a version as far as asked.
-fn examined(version: &Version, extent: Extent) -> Result<Examined, String> {
+fn examined(version: &Version, variant: Option<&str>, extent: Extent) -> Result<Examined, String> {
     let Some(files) = &version.files else { return Ok(Examined::default()) };
     // Read once here so that an unreadable design is told from an unreadable import.
     files.read(&version.source).map_err(|e| cannot_read(&version.name, &e.to_string()))?;
     let stem = version.source.strip_suffix(".mech").unwrap_or(&version.source);
-    let lock = format!("{stem}.lock");
+    let lock = format!("{stem}{}.lock", variant.map(|v| format!(".{v}")).unwrap_or_default());
     let lock = match files.read(&lock) {
         Ok(text) => Some((lock, text)),
         Err(FileError::NotFound) => None,
         Err(e) => return Err(cannot_read(&format!("the lock of {}", version.name), &e.to_string())),
     };
-    let request = Request { source: version.source.clone(), lock, ..Request::default() };
+    let variant = variant.map(String::from);
+    let request = Request { source: version.source.clone(), variant, lock, ..Request::default() };
     Ok(examine(&request, Values::LockOrStart, extent, &Compiler::default(), files.as_ref()))
 }
 
-fn told(before: &Version, after: &Version, format: Format) -> u8 {
-    let both = |extent| rayon::join(|| examined(before, extent), || examined(after, extent));
+/// What differs, of the design as it stands or of a variant, and both versions of it.
+fn compared(
+    before: &Version,
+    after: &Version,
+    variant: Option<&str>,
+) -> Result<(Changes, Examined, Examined), String> {
+    let both =
+        |extent| rayon::join(|| examined(before, variant, extent), || examined(after, variant, extent));
     let pair = |(a, b): (Result<Examined, String>, Result<Examined, String>)| Ok::<_, String>((a?, b?));
-    let found = pair(both(Extent::Values)).and_then(|(a, b)| {
-        let changes = compare(&a, &b);
-        // Only what differs, and can be simulated, is worth the time.
-        let fine = [&a, &b].iter().all(|e| !e.outcome.failed());
-        if changes.unchanged || !fine {
-            return Ok((changes, a, b));
+    let (a, b) = pair(both(Extent::Values))?;
+    let changes = compare(&a, &b);
+    // Only what differs, and can be simulated, is worth the time.
+    let fine = [&a, &b].iter().all(|e| !e.outcome.failed());
+    if changes.unchanged || !fine {
+        return Ok((changes, a, b));
+    }
+    let (a, b) = pair(both(Extent::Volume))?;
+    Ok((compare(&a, &b), a, b))
+}
+
+/// Variants of both versions that do something else, each with what differs; what the text says is told of the whole.
+fn variants(
+    before: &Version,
+    after: &Version,
+    [a, b]: [&Examined; 2],
+) -> Result<Vec<(String, Changes)>, String> {
+    let mut found = Vec::new();
+    for name in a.outcome.variants.iter().filter(|v| b.outcome.variants.contains(v)) {
+        let (mut changes, ..) = compared(before, after, Some(name))?;
+        changes.names.clear();
+        changes.lines.clear();
+        let differs = changes.behaviour.iter().any(Row::differs) || changes.values[0] != changes.values[1];
+        if !changes.numbers.is_empty() || differs {
+            found.push((name.clone(), changes));
         }
-        let (a, b) = pair(both(Extent::Volume))?;
-        Ok((compare(&a, &b), a, b))
+    }
+    Ok(found)
+}
+
+fn told(before: &Version, after: &Version, format: Format) -> u8 {
+    let found = compared(before, after, None).and_then(|(changes, a, b)| {
+        let variants = variants(before, after, [&a, &b])?;
+        Ok((changes, a, b, variants))
     });
-    let (changes, a, b) = match found {
+    let (changes, a, b, variants) = match found {
         Ok(found) => found,
         Err(why) => return refused(&why, format),
     };
     match format {
-        Format::Human => print(&human([before, after], [&a, &b], &changes, Style::stdout())),
+        Format::Human => {
+            let style = Style::stdout();
+            let mut text = human([before, after], [&a, &b], &changes, style);
+            for (name, changes) in &variants {
+                let _ = writeln!(text, "\n{}", style.bold(&format!("variant {name}")));
+                numbers(&mut text, &changes.numbers, style);
+                behaviour(&mut text, changes, style);
+            }
+            print(&text)
+        }
         Format::Json | Format::Sarif => {
             let mut value = serde_json::json!(changes);
             if let Some(fields) = value.as_object_mut() {
@@ -193,6 +234,9 @@ fn told(before: &Version, after: &Version, format: Format) -> u8 {
                 };
                 fields.insert("before".into(), side(before, &a));
                 fields.insert("after".into(), side(after, &b));
+                let variants =
+                    variants.iter().map(|(name, changes)| (name.clone(), serde_json::json!(changes)));
+                fields.insert("variants".into(), variants.collect::<serde_json::Map<_, _>>().into());
             }
             print(&format!("{value}\n"))
         }

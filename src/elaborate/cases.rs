@@ -52,6 +52,7 @@ impl<'a> Evaluator<'a> {
             let around = std::mem::replace(&mut self.as_is, false);
             let loads = self.loads(scope, inner, s, weightless);
             self.as_is = around;
+            self.loaded = true;
             let (objectives, requirements) = self.goals(scope, inner, named, outside);
             let Ok(loads) = loads else { continue };
             if self.has_loads(name, inner).and_then(|()| self.without_solids(&requirements)).is_ok() {

@@ -84,6 +84,8 @@ pub struct Evaluator<'a> {
     interned: HashMap<(u8, u64, u64), ExprId>,
     /// Nothing is driven: the conventional mechanism has no path.
     pub(super) undriven: bool,
+    /// Whether loads act where goals are looked at: those of the mechanism, or of the case.
+    pub(super) loaded: bool,
     /// Directions, outputs and targets of the mechanism.
     pub(super) aims: super::aims::AimNames,
     /// Names of the strings.
@@ -121,6 +123,7 @@ impl<'a> Evaluator<'a> {
             half_said: BTreeSet::new(),
             interned: HashMap::new(),
             undriven: false,
+            loaded: false,
             aims: super::aims::AimNames::default(),
             cables: BTreeSet::new(),
             sliders: BTreeSet::new(),

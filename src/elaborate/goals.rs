@@ -12,7 +12,8 @@ use std::collections::BTreeMap;
 
 /// Most steps of a cycle.
 const MAX_STEPS: f64 = 100_000.0;
-const EXPORTS: &[&str] = &[
+/// What can be exported.
+pub const EXPORTS: &[&str] = &[
     "stl",
     "3mf",
     "sheet",

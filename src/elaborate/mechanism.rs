@@ -85,6 +85,7 @@ impl<'a> Evaluator<'a> {
         let named = Named { traces: &trace_index, driven: &driven, drives: drives.as_deref() };
         // Goals do not grow with the drawing.
         self.as_is = true;
+        self.loaded = !sheet.loads.is_empty() || sheet.broken;
         let (objectives, requirements) = self.goals(scope, &sheet, &named, outside);
         let cases = self.cases(scope, &sheet, &s, &named, weightless, outside);
         let mut exports = Vec::new();

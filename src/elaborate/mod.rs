@@ -56,6 +56,7 @@ mod workspaces;
 use crate::diagnostic::{Diagnostic, Edit, Fix, Origin, SourceMap};
 use crate::ir::{Assembly, Design};
 use crate::syntax::ast::{self, Item, Mechanism};
+pub use goals::EXPORTS;
 pub use known::{KnownValue, quantity};
 pub use load::{std_modules, std_source, std_text};
 use settings::Settings;
@@ -126,6 +127,8 @@ pub struct Elaborated {
     pub design: Option<Design>,
     /// Names of the variants of what the file builds.
     pub variants: Vec<String>,
+    /// Where none was chosen, what each of them builds, in their order; empty where there are errors.
+    pub others: Vec<Assembly>,
     /// Every text that was read: the root file first, then imports, then `--set` values.
     pub sources: SourceMap,
     /// The design's own files as understood, the root file first.
@@ -159,6 +162,7 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
             assembly: None,
             design: None,
             variants: Vec::new(),
+            others: Vec::new(),
             sources,
             files: Vec::new(),
             values: Vec::new(),
@@ -177,6 +181,7 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
     if let (Some(name), None, Some(m)) = (&options.variant, chosen, built) {
         diagnostics.push(variants::missing(name, &variants, m));
     }
+    let mut others_built = Vec::new();
     let own_settings = chosen.map(|v| variants::settings(v, &settings));
     for (m, is_root) in others.into_iter().map(|m| (m, false)).chain(built.map(|m| (m, true))) {
         let settings = if is_root { own_settings.as_ref().unwrap_or(&settings) } else { &no_settings };
@@ -187,6 +192,7 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
                 let settings = variants::settings(variant, settings);
                 let mut other = elaborated(&program, &settings, m, &outside, true);
                 found.used.append(&mut other.used);
+                others_built.extend(other.assembly);
                 let new = other.out.into_iter().filter(|d| !found.out.contains(d)).collect::<Vec<_>>();
                 found.out.extend(new.into_iter().map(|d| d.also(variant.name.at, "in this variant")));
             }
@@ -220,6 +226,7 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
         }
     } else {
         assembly = None;
+        others_built.clear();
     }
     tidy(&mut diagnostics);
     let design = assembly.as_ref().and_then(Assembly::single).cloned();
@@ -229,7 +236,7 @@ pub fn elaborate(root: &str, files: &dyn Files, options: &Options) -> Elaborated
         files.push(OwnFile { id: module.file_id, path: module.path, ast: module.file });
     }
     files.sort_by_key(|f| f.id);
-    Elaborated { assembly, design, variants, sources, files, values, diagnostics }
+    Elaborated { assembly, design, variants, others: others_built, sources, files, values, diagnostics }
 }
 
 /// The repair that takes a statement out.

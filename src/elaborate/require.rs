@@ -10,8 +10,8 @@ use crate::syntax::ast::{Argument, Compare, Expr, ExprKind, Ident};
 use std::collections::BTreeMap;
 
 const AGGREGATES: &[&str] = &["max", "min", "mean", "span", "at"];
-const LATER_QUANTITIES: &[&str] = &["buckling", "robust"];
-const QUANTITIES: &[&str] = &["error", "stress", "torque", "force", "tension", "gap", "angle"];
+const LATER_QUANTITIES: &[&str] = &["robust"];
+const QUANTITIES: &[&str] = &["error", "stress", "torque", "force", "tension", "gap", "angle", "buckling"];
 /// A query as written: `max(error(tip))`.
 struct Query<'a> {
     outer: Option<&'a Ident>,
@@ -164,6 +164,14 @@ impl<'a> Evaluator<'a> {
             "gap" => {
                 self.arguments(name, args, &[], 0)?;
                 Ok((Quantity::Gap, Dimension::LENGTH))
+            }
+            "buckling" => {
+                self.arguments(name, args, &[], 0)?;
+                if !self.loaded {
+                    // What drives alone press together has no load that could grow.
+                    return self.later(codes::LATER_TERM, "buckling() without a load", name.at);
+                }
+                Ok((Quantity::Buckling, Dimension::NUMBER))
             }
             "torque" => {
                 let slots = self.arguments(name, args, &["drive"], 1)?;

@@ -5,6 +5,7 @@
 //! The rods are condensed one by one onto the links they join, so what is solved here is a small
 //! symmetric saddle-point system of link increments and multipliers.
 
+mod buckling;
 mod change;
 mod design_load;
 mod frames;
@@ -20,6 +21,7 @@ mod sweep;
 mod target;
 mod weight;
 
+pub use buckling::{MOST_FACTOR, load_factors};
 pub use change::{DirectionChange, DriveChange, EndFrameChange, LayoutChange, TraceChange};
 pub use design_load::{LayoutLoad, LayoutLoadKind};
 pub use frames::RodEndFrame;

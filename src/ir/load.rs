@@ -1,6 +1,6 @@
 //! Loads on the mechanism from outside: dead forces, moments about an axis, the weight of its parts; and load cases.
 
-use super::{BodyId, Design, ExprPoint, Objective, Origin, Profile, Requirement};
+use super::{BodyId, Design, ExprPoint, Objective, Origin, Profile, Quantity, Requirement};
 use serde::{Deserialize, Serialize};
 
 /// Sizes at t = 0 and t = 1 that agree to this part of the larger make the same pose.
@@ -83,6 +83,11 @@ impl Design {
         let loads = self.loads.iter().chain(&case.loads).cloned().collect();
         let (objectives, requirements) = (case.objectives.clone(), case.requirements.clone());
         Self { loads, objectives, requirements, cases: Vec::new(), ..self.clone() }
+    }
+
+    /// Whether anything asks how far the loads are from buckling it.
+    pub fn asks_for_buckling(&self) -> bool {
+        self.requirements.iter().any(|r| r.quantity == Quantity::Buckling)
     }
 
     /// Its own loads and those of its cases.

@@ -549,6 +549,8 @@ pub enum Quantity {
     Angle(usize),
     /// Pull of a string, N, negative where it would have to push. Index into [`Design::drives`].
     Tension(usize),
+    /// Factor by which all loads can grow before the mechanism buckles.
+    Buckling,
 }
 
 /// Material data; what the text does not state is absent.

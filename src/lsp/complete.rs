@@ -3,10 +3,10 @@
 use super::names::{Symbol, What};
 use super::outline::word;
 use super::space::{Place, Space};
-use super::vocabulary::{AT_TOP, FUNCTIONS, IN_FLEXURE, IN_MECHANISM};
-use crate::elaborate::{std_modules, units};
-use crate::syntax::statement_form;
-use crate::syntax::tree::Kind;
+use super::vocabulary::FUNCTIONS;
+use crate::elaborate::{EXPORTS, std_modules, units};
+use crate::syntax::tree::{Kind, Node};
+use crate::syntax::{starting_words, statement_form};
 
 /// A proposal.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -89,7 +89,7 @@ pub fn complete(space: &Space, file: &str, byte: usize, beside: &[String]) -> Ve
         }
         _ if first == "place" && ends('=') => at.tops(&[What::Mechanism]),
         _ if first == "mirror" && ends('=') => at.locals(&[What::Instance]),
-        _ if first == "export" => ["stl", "arduino"].map(|e| proposal(e, "what is made", "keyword")).into(),
+        _ if first == "export" => EXPORTS.iter().map(|e| proposal(e, "what is made", "keyword")).collect(),
         _ => at.values(),
     }
 }
@@ -165,17 +165,8 @@ impl Around<'_> {
 
     /// Words that can begin a line.
     fn statements(&self, byte: usize) -> Vec<Proposal> {
-        let block = self.space.files.get(self.file).and_then(|t| {
-            let (kind, range) = t.names.blocks.get(self.block?)?;
-            // Behind its last sign nothing is in a block any more.
-            (byte < range.end).then_some(*kind)
-        });
-        let words = match block {
-            Some(Kind::Mechanism) => IN_MECHANISM,
-            Some(Kind::Flexure) => IN_FLEXURE,
-            Some(_) => &[],
-            None => AT_TOP,
-        };
+        let block = self.space.files.get(self.file).map_or(Kind::File, |t| innermost(&t.tree, byte));
+        let words = starting_words(block);
         words.iter().map(|w| proposal(w, statement_form(w).unwrap_or(""), "keyword")).collect()
     }
 
@@ -189,6 +180,21 @@ impl Around<'_> {
         }));
         all.push(proposal("free", "free START in LOWER .. UPPER", "keyword"));
         all
+    }
+}
+
+/// The kind of the block around a place.
+fn innermost(node: &Node, byte: usize) -> Kind {
+    // Behind its last sign nothing is in a block any more.
+    let around = node.children.iter().find(|c| {
+        let range = c.range();
+        range.start < byte && byte < range.end
+    });
+    let inner = around.map_or(Kind::File, |c| innermost(c, byte));
+    match node.kind {
+        _ if inner != Kind::File => inner,
+        Kind::Mechanism | Kind::Flexure | Kind::Record | Kind::For | Kind::Case => node.kind,
+        _ => Kind::File,
     }
 }
 

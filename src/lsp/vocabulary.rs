@@ -59,6 +59,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     ),
     function("error", &["TRACE", "form = closest"], "the distance from the target"),
     function("tension", &["STRING"], "the force in a string, with its sign"),
+    function("buckling", &[], "the factor by which all loads can grow before it buckles, at most 10"),
     function("gap", &[], "the least distance between what moves"),
     function("angle", &["BODY about DIRECTION"], "how far a body has turned"),
     function("mean", &["QUANTITY"], "the mean over the cycle"),
@@ -77,40 +78,3 @@ pub(super) const FUNCTIONS: &[Function] = &[
 pub(super) fn named(name: &str) -> Option<&'static Function> {
     FUNCTIONS.iter().find(|f| f.name == name)
 }
-
-/// Statements of a mechanism.
-pub(super) const IN_MECHANISM: &[&str] = &[
-    "param",
-    "let",
-    "point",
-    "ground",
-    "link",
-    "hinge",
-    "ball",
-    "universal",
-    "slider",
-    "cylindrical",
-    "fixed",
-    "string",
-    "material",
-    "print",
-    "links",
-    "model",
-    "cycle",
-    "drive",
-    "rest",
-    "load",
-    "trace",
-    "target",
-    "output",
-    "minimize",
-    "require",
-    "export",
-    "place",
-    "mirror",
-];
-/// Statements of a flexure.
-pub(super) const IN_FLEXURE: &[&str] = &["param", "let", "body", "rod"];
-/// What begins a declaration at the top of a file.
-pub(super) const AT_TOP: &[&str] =
-    &["edition", "use", "mechanism", "flexure", "material", "process", "motor"];

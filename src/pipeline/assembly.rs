@@ -125,6 +125,7 @@ fn placed_simulation(
         gaps_mm: series(&simulation.gaps_mm),
         worst: placed_worst(instance, &simulation.worst),
         sway_mm: simulation.sway_mm.clone(),
+        load_factors: series(&simulation.load_factors),
         conventional: None,
         aims,
         // What a motor in common would do released is not known from one half.

@@ -15,7 +15,8 @@ use crate::diagnostic::{Diagnostic, Origin};
 use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
 use crate::equilibrium::{
-    Cycle, Equilibrium, Layout, LayoutTrace, Model, ModelError, PointForce, Solver, SweepError, sweep,
+    Cycle, Equilibrium, Layout, LayoutTrace, Model, ModelError, PointForce, Solver, SweepError, load_factors,
+    sweep,
 };
 use crate::geometry::{follows_geometry, parts_input};
 use crate::ir::expr::Node;
@@ -63,6 +64,7 @@ impl Stages for Compiler {
             sources: out.sources,
             assembly: out.assembly,
             variants: out.variants,
+            others: out.others,
             files: out.files,
             diagnostics: out.diagnostics,
         }
@@ -332,7 +334,8 @@ fn swept(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle, motion:
     let stress = most_stressed(design, model, cycle);
     let sway_mm = gives_way(design, layout, model, cycle);
     let worst = Worst { stress, gap: None };
-    Simulation { motion, errors_mm, aims, worst, sway_mm, diagnostics, ..Simulation::default() }
+    let load_factors = if design.asks_for_buckling() { load_factors(model, cycle) } else { Vec::new() };
+    Simulation { motion, errors_mm, aims, worst, sway_mm, load_factors, diagnostics, ..Simulation::default() }
 }
 
 /// States at which the give of the traced points is looked at.

@@ -143,6 +143,7 @@ fn unit(quantity: &Quantity) -> &'static str {
         Quantity::Error(_) | Quantity::ErrorClosest(_) | Quantity::Gap => "mm",
         Quantity::AimError(_) | Quantity::Angle(_) => "deg",
         Quantity::Stress => "MPa",
+        Quantity::Buckling => "",
         Quantity::Torque(_) => "N·mm",
         Quantity::Force(_) | Quantity::Tension(_) => "N",
     }
@@ -157,6 +158,7 @@ fn series(simulation: &Simulation, quantity: &Quantity) -> Vec<f64> {
         Quantity::AimError(i) => simulation.aims.aim_errors_rad.get(i).cloned().unwrap_or_default(),
         Quantity::Angle(i) => simulation.aims.angles_rad.get(i).cloned().unwrap_or_default(),
         Quantity::Gap => simulation.gaps_mm.clone(),
+        Quantity::Buckling => simulation.load_factors.clone(),
         Quantity::Stress => states.iter().map(|s| s.stress_max_mpa).collect(),
         Quantity::Torque(drive) | Quantity::Force(drive) => {
             states.iter().filter_map(|s| s.drive_loads.get(drive).map(|t| t.abs())).collect()

@@ -204,16 +204,16 @@ fn run_build(
 }
 
 /// Findings of the variants that the design as it stands has not.
-fn check_variants(request: &Request, stages: &dyn Stages, files: &dyn Files, out: &mut BuildOutcome) {
-    for variant in out.variants.clone() {
-        let mut other = BuildOutcome::default();
-        let request = Request { variant: Some(variant.clone()), ..request.clone() };
-        front_end(&request, stages, files, &mut other);
+fn check_variants(variants: &[Assembly], stages: &dyn Stages, out: &mut BuildOutcome) {
+    for (name, assembly) in out.variants.clone().iter().zip(variants) {
+        let (sources, files) = (out.sources.clone(), out.files.clone());
+        let mut other = BuildOutcome { sources, files, ..BuildOutcome::default() };
+        proved(assembly, stages, &mut other);
         for mut d in other.diagnostics {
             let place = |d: &Diagnostic| d.labels.first().map(|l| l.at);
             let same = |o: &Diagnostic| o.code == d.code && o.message == d.message && place(o) == place(&d);
             if !out.diagnostics.iter().any(same) {
-                d.message.push_str(&format!(" (variant `{variant}`)"));
+                d.message.push_str(&format!(" (variant `{name}`)"));
                 out.diagnostics.push(d);
             }
         }
@@ -223,15 +223,15 @@ fn check_variants(request: &Request, stages: &dyn Stages, files: &dyn Files, out
 /// Text to a design without errors, and where no variant is chosen, all its variants too.
 pub fn check(request: &Request, stages: &dyn Stages, files: &dyn Files) -> BuildOutcome {
     let mut out = BuildOutcome::default();
-    if let Some(assembly) = front_end(request, stages, files, &mut out) {
+    let read = read(request, stages, files, &mut out);
+    let proved = read.and_then(|(assembly, others)| Some((proved(&assembly, stages, &mut out)?, others)));
+    if let Some((assembly, others)) = proved {
         // Where the lock is current, the solution can be looked at for the price of a sweep.
         let simulated = lints::from_lock(request, &assembly, stages, &mut out);
         if let Some((values, simulations)) = simulated {
             lints::solved(&assembly, &values, &simulations, stages, &mut out);
         }
-        if request.variant.is_none() {
-            check_variants(request, stages, files, &mut out);
-        }
+        check_variants(&others, stages, &mut out);
     }
     lints::finish(request, &mut out);
     out
@@ -298,6 +298,17 @@ fn front_end(
     files: &dyn Files,
     out: &mut BuildOutcome,
 ) -> Option<Assembly> {
+    let (assembly, _) = read(request, stages, files, out)?;
+    proved(&assembly, stages, out)
+}
+
+/// Text to what is built, and to what its variants build where none is chosen.
+fn read(
+    request: &Request,
+    stages: &dyn Stages,
+    files: &dyn Files,
+    out: &mut BuildOutcome,
+) -> Option<(Assembly, Vec<Assembly>)> {
     let checked =
         stages.check(&request.source, &request.overrides, request.steps, request.variant.as_deref(), files);
     out.sources = checked.sources;
@@ -308,21 +319,24 @@ fn front_end(
     if out.diagnostics.iter().any(Diagnostic::is_error) {
         return None;
     }
-    let assembly = checked.assembly?;
+    Some((checked.assembly?, checked.others))
+}
+
+/// That it can be assembled all the way is part of being right; with what lints say until then.
+fn proved(assembly: &Assembly, stages: &dyn Stages, out: &mut BuildOutcome) -> Option<Assembly> {
     let told = out.diagnostics.len();
-    lints::text(&assembly, out);
-    // That it can be assembled all the way is part of being right.
+    lints::text(assembly, out);
     let mut motions = Vec::new();
     for design in &assembly.designs {
         let rigid = keep(stages.rigid(design, &starts(design)), &mut out.diagnostics)?;
         tell_once(rigid.diagnostics, out);
         motions.push(rigid.conventional);
     }
-    lints::moving(&assembly, &motions, stages, out);
+    lints::moving(assembly, &motions, stages, out);
     lints::sort(out, told);
     out.design = assembly.single().cloned();
     out.assembly = Some(assembly.clone());
-    Some(assembly)
+    Some(assembly.clone())
 }
 
 /// Findings that another design of the same mechanism has not given yet.

@@ -26,6 +26,8 @@ pub struct Checked {
     pub assembly: Option<Assembly>,
     /// Names of its variants.
     pub variants: Vec<String>,
+    /// What each of them builds, in their order, where none was chosen and there were no errors.
+    pub others: Vec<Assembly>,
     /// The design's own files as understood.
     pub files: Vec<OwnFile>,
     /// Findings.
@@ -50,6 +52,8 @@ pub struct Simulation {
     /// How far each traced point gives way to 1 N across its path, at most over some states, mm; of a conventional
     /// motion nothing.
     pub sway_mm: Vec<f64>,
+    /// Factor by which all loads can grow at every state before it buckles; empty where nothing asks for it.
+    pub load_factors: Vec<f64>,
     /// Of a conventional motion, the motion.
     pub conventional: Option<Motion>,
     /// The same under each of the design's load cases, without what only solids and released drives show; of a

@@ -58,6 +58,11 @@ fn unread(text: &str, diagnostic: Diagnostic) -> Parse {
     Parse { tree, file: ast::File::default(), diagnostics: vec![diagnostic] }
 }
 
+/// Words that can start a line in a block of a kind, or at the top of a file for [`tree::Kind::File`].
+pub fn starting_words(block: tree::Kind) -> Vec<&'static str> {
+    words::starting(block)
+}
+
 /// How a statement is written, by the word it starts with.
 pub fn statement_form(word: &str) -> Option<&'static str> {
     words::form(word)

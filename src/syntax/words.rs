@@ -1,5 +1,7 @@
 //! The words a line may start with, the form of each statement, and the nearest word to a typo.
 
+use super::tree::Kind;
+
 /// Words that start a top-level declaration.
 pub(super) const ITEM_WORDS: &[&str] =
     &["edition", "use", "mechanism", "flexure", "material", "process", "motor", "allow"];
@@ -53,6 +55,26 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
     "variant",
     "workspace",
 ];
+
+/// Those of [`STATEMENT_WORDS`] whose statements a later version will understand.
+const LATER_WORDS: &[&str] =
+    &["fatigue", "hole", "horn", "mount", "plate", "solid", "spring", "stop", "sweep", "tolerance"];
+
+/// Words that can start a line in a block of a kind, or at the top of a file for [`Kind::File`].
+pub(super) fn starting(block: Kind) -> Vec<&'static str> {
+    const IN_FLEXURE: &[&str] = &["param", "let", "body", "rod", "allow"];
+    match block {
+        Kind::File => ITEM_WORDS.to_vec(),
+        Kind::Mechanism => {
+            let own = |w: &&&str| !LATER_WORDS.contains(w) && !matches!(**w, "body" | "rod");
+            STATEMENT_WORDS.iter().filter(own).copied().collect()
+        }
+        Kind::Flexure => IN_FLEXURE.to_vec(),
+        Kind::For => vec!["place", "mirror", "require", "export", "for"],
+        Kind::Case => vec!["load", "minimize", "require"],
+        _ => Vec::new(),
+    }
+}
 
 /// Whether a line starts a statement, as `statement_start` of the grammar has it.
 pub(super) fn starts_statement(line: &str) -> bool {

@@ -2,7 +2,8 @@
 if exists("b:current_syntax") | finish | endif
 syntax keyword mechStatement edition use mechanism flexure replaces material process motor param let point ground link links model
 syntax keyword mechStatement hinge ball universal slider cylindrical fixed print cycle drive rest trace output target minimize require export
-syntax keyword mechStatement rod body load string place mirror
+syntax keyword mechStatement rod body load string place mirror allow assert case for variant workspace
+syntax keyword mechStatement fatigue hole horn mount plate solid spring stop sweep tolerance
 syntax keyword mechClause on to at from by with steps over weight along section axis layer pin into toward as in free and about via drum
 syntax keyword mechClause continuous turned scale merging across sharing height gravity moment direction keys linear smooth first second
 syntax match mechNumber /\<\d\+\(\.\d\+\)\?\([eE][-+]\?\d\+\)\?\>/ nextgroup=mechUnit skipwhite

@@ -3,6 +3,9 @@
 //! A pair of links that at some state of the cycle meet at less than 20°, or nearly in line: the transmission angle, by which a
 //! force goes from one to the other. The finding says the least angle, and where.
 //!
+//! Only mechanisms that are planar and fall apart into pairs of links hinged to what moves already are looked at. In space
+//! the angle depends on where the force goes on to, which the text does not say: there, look at the torque (W1302).
+//!
 //! ## Why it matters
 //!
 //! Near such a dead point a large force in the links makes a small one at the output: friction and the stiffness of the

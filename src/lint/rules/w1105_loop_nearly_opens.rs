@@ -3,6 +3,9 @@
 //! A loop that at some state of the cycle is nearly stretched out or folded: if its links were shorter by the process's clearance (or by
 //! 1 % of their lengths, where that is more), it could not be assembled there. The finding says what is left, and where.
 //!
+//! Only mechanisms that are planar and fall apart into pairs of links hinged to what moves already are looked at: of such a pair two
+//! lengths and a distance decide. In space, that a loop opens is an error (E0503) with the drive's value; how much is left is not told.
+//!
 //! ## Why it matters
 //!
 //! What is drawn goes round; what is printed, with lengths a little off and pins with play, jams. And flexures are no

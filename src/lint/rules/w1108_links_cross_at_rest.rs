@@ -3,6 +3,8 @@
 //! Two links of a planar mechanism in the same layer that lie across each other in the rest pose, without a joint between
 //! them. Only the lines between their points are looked at; the solids, which are wider, a build looks at.
 //!
+//! In a mechanism in space lines hardly ever cross, and links have no layers: there the solids are compared, by a build (E0633).
+//!
 //! ## Why it matters
 //!
 //! They are printed as one piece, and nothing moves.

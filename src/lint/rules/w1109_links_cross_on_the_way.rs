@@ -3,6 +3,8 @@
 //! Two links of a planar mechanism in the same layer that cross at some state of the cycle, but not in the rest pose. The
 //! finding says where first.
 //!
+//! In a mechanism in space lines hardly ever cross, and links have no layers: there the solids are compared, by a build (W0635).
+//!
 //! ## Why it matters
 //!
 //! They run into each other: the part jams or breaks there. A build tells it too, by the solids, but only after solving.
