@@ -141,7 +141,9 @@ impl<'d> Problem<'d> {
 
     /// What an rms error of this part of its scale adds to the cost, of the track that counts most; zero where none has a scale.
     pub fn cost_of_error(&self, part: f64) -> f64 {
-        0.5 * objectives::STEPS_OF_WEIGHTS * part * part * objectives::largest_weight_of_scaled(self.design)
+        let weight = objectives::largest_weight_of_scaled(self.design);
+        let own = 0.5 * objectives::STEPS_OF_WEIGHTS * part * part * weight;
+        self.under.iter().map(|(_, problem)| problem.cost_of_error(part)).fold(own, f64::max)
     }
 
     /// Cycles simulated so far.
