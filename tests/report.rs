@@ -197,8 +197,8 @@ fn the_scene_is_what_was_solved() {
     let ghost = shown.named("ghosts", "arm");
     let bar = &ghost["bars"][0];
     let ends = [vector(&bar[0]), vector(&bar[1])].map(|p| shown.follow(&ghost["s"], p));
-    for s in 0..5 {
-        let (mut inner, mut outer) = (ends[0][s], ends[1][s]);
+    for (s, (&one, &other)) in ends[0].iter().zip(&ends[1]).enumerate() {
+        let (mut inner, mut outer) = (one, other);
         if inner.xy().norm() > outer.xy().norm() {
             std::mem::swap(&mut inner, &mut outer);
         }
