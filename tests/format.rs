@@ -406,7 +406,10 @@ fn mutated(rounds: usize) {
             let (a, b) = (a.min(b), a.max(b));
             match dice.below(5) {
                 0 => drop(text.drain(a..b)),
-                1 => text.insert_str(a, &text[a..b].to_string()),
+                1 => {
+                    let twice = text[a..b].to_string();
+                    text.insert_str(a, &twice);
+                }
                 2 => text.insert_str(a, SIGNS[dice.below(SIGNS.len())]),
                 3 => text.replace_range(a..b, &brought),
                 _ => text.truncate(b),

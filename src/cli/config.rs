@@ -115,7 +115,7 @@ fn read(source: &Path) -> Result<Option<(Config, PathBuf)>, Faults> {
     let Found { folder, text, file } = match found(&folder, &mut sources) {
         Ok(Some(found)) => found,
         Ok(None) => return Ok(None),
-        Err(why) => return Err((vec![why], sources)),
+        Err(why) => return Err((vec![*why], sources)),
     };
     match toml::from_str(&text) {
         Ok(config) => Ok(Some((config, folder))),
@@ -143,13 +143,13 @@ pub struct Found {
 ///
 /// # Errors
 /// E0730 where it cannot be read.
-pub fn found(folder: &Path, sources: &mut SourceMap) -> Result<Option<Found>, Diagnostic> {
+pub fn found(folder: &Path, sources: &mut SourceMap) -> Result<Option<Found>, Box<Diagnostic>> {
     let top = folder.ancestors().find(|a| a.join(".git").exists()).unwrap_or(folder);
     let within = folder.ancestors().take_while(|a| a.starts_with(top));
     let Some(folder) = within.into_iter().find(|a| a.join(NAME).is_file()) else { return Ok(None) };
     let path = folder.join(NAME);
     let text = read_text(&path).map_err(|why| {
-        placeless(Severity::Error, "E0730", format!("cannot read `{}`: {why}", path.display()))
+        Box::new(placeless(Severity::Error, "E0730", format!("cannot read `{}`: {why}", path.display())))
     })?;
     let file = sources.add(path.display().to_string(), text.clone());
     Ok(Some(Found { folder: folder.to_path_buf(), text, file }))

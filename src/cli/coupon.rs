@@ -69,7 +69,7 @@ fn carry_out(arguments: &Arguments, sources: &mut SourceMap) -> Said {
             let failed = |e: String| vec![placeless(Severity::Error, "E0730", e)];
             let text =
                 read_text(path).map_err(|e| failed(format!("cannot read `{}`: {e}", path.display())))?;
-            let file = sources.add(&path.display().to_string(), &text);
+            let file = sources.add(path.display().to_string(), &text);
             let found = fit(&coupon, file, &text)?;
             Ok((told(&coupon, &found), found.warnings))
         }

@@ -49,7 +49,7 @@ impl LintFlags {
                 Ok(config) => levels.config = config,
                 Err(why) => found.extend(why),
             },
-            Err(why) => found.push(why),
+            Err(why) => found.push(*why),
         }
         if let Some(path) = &self.baseline {
             match read(path, &mut sources).and_then(|(text, file)| Baseline::parse(&text, file)) {
