@@ -590,7 +590,8 @@ fn bad_data_are_diagnostics() {
     }
     let mut design = chebyshev(false);
     design.traces[0].point[0] = design.exprs.constant(f64::NAN);
-    assert_eq!(solve_motion(&design, &[]).unwrap_err()[0].code, "E0501");
+    let wrong = solve_motion(&design, &[]).unwrap_err();
+    assert_eq!((wrong[0].code.as_str(), wrong[0].labels[0].at), ("E0501", design.traces[0].origin));
 }
 
 #[test]

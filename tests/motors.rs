@@ -19,34 +19,7 @@ const PULSE_US: f64 = 5.0;
 const TABLE_DEG: f64 = 1.01e-3;
 
 /// A four-bar that nods; `DRIVE`, `MORE` and `EXPORTS` are put in.
-const NODDER: &str = "use std.materials.rigur
-use std.processes.polyjet
-use std.flexures.crossed_leaves
-use std.motors.MOTOR
-
-mechanism nodder {
-    point O = (0 mm, 0 mm)
-    point A = (0 mm, 15 mm)
-    point B = (40 mm, 30 mm)
-    point D = (45 mm, 0 mm)
-    ground base    { O, D }  layer -2
-    link   crank   { O, A }  layer -1
-    link   coupler { A, B }
-    link   rocker  { B, D }
-    hinge motor: base to crank     at O  layer -1
-    hinge pin:   crank to coupler  at A  layer -1  pin 3 mm
-    hinge knee:  coupler to rocker at B  as crossed_leaves
-    hinge heel:  rocker to base    at D  into base toward D - (0 mm, 25 mm)  as crossed_leaves
-    material rigur
-    print on polyjet
-    cycle 40 steps over 2 s
-    DRIVE
-    trace tip = B on rocker
-    output nod = angle(rocker about z)
-    MORE
-    export EXPORTS
-}
-";
+const NODDER: &str = include_str!("motors/nodder.mech");
 
 fn nodder(motor: &str, drive: &str, more: &str, exports: &str) -> String {
     let text = NODDER.replace("MOTOR", motor).replace("DRIVE", drive).replace("MORE", more);

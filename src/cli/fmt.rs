@@ -134,7 +134,8 @@ impl Run {
             Ok(new) => {
                 if new.left > 0 {
                     let parts = if new.left == 1 { "1 part" } else { &format!("{} parts", new.left) };
-                    let at = Origin { file, start: 0, end: 0 };
+                    let start = new.first_left.unwrap_or(0);
+                    let at = Origin { file, start, end: start };
                     let text = format!("`{name}`: {parts} with errors left as written");
                     let help = "`flexura check` tells what is wrong";
                     self.found.push(Diagnostic::warning("W0751", text, at).help(help));

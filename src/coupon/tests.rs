@@ -52,6 +52,7 @@ fn what_is_no_reading_is_told_with_its_line() {
         ("thin,0.8,6,10,9,9\n", "E0771", "thin,0.8,6,10,9,9"),
         ("thin,0.8,6,10,-3\r\n", "E0771", "thin,0.8,6,10,-3"),
         ("thin,0.8,6,10,59\n", "E0771", "thin,0.8,6,10,59"),
+        ("thin,0.8,6,10,5\nthin,0.001,6,900,5\n", "E0772", "thin,0.001,6,900,5"),
     ] {
         let text = format!("{head}{lines}");
         let wrong = fit(&coupon, 0, &text).unwrap_err();

@@ -526,7 +526,7 @@ fn slack(design: &Design, model: &Model, cycle: &Cycle) -> Vec<Diagnostic> {
 }
 
 /// What a followed cycle says about itself.
-fn judge(design: &Design, layout: &Layout, cycle: &Cycle) -> Vec<Diagnostic> {
+pub(super) fn judge(design: &Design, layout: &Layout, cycle: &Cycle) -> Vec<Diagnostic> {
     let mut found = Vec::new();
     let saddle = |(s, e): (usize, &Equilibrium)| {
         let drives: Vec<f64> = layout.drives.iter().map(|d| d.values[s]).collect();

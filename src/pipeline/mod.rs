@@ -549,4 +549,6 @@ pub fn placeless(severity: Severity, code: &str, message: impl Into<String>) -> 
 }
 
 #[cfg(test)]
+mod judged_tests;
+#[cfg(test)]
 mod tests;

@@ -132,7 +132,7 @@ fn values(design: &Design, drives: &[f64]) -> DriveValues {
     design.drives.iter().zip(drives).map(named).collect()
 }
 
-fn snapped(design: &Design, snap: &Snap) -> Diagnostic {
+pub(super) fn snapped(design: &Design, snap: &Snap) -> Diagnostic {
     let message = format!(
         "the mechanism snaps on the way to state {}, although its drives are held: {:.3} N·mm are lost",
         snap.state, snap.lost_n_mm

@@ -36,8 +36,8 @@ pub(super) struct Cell {
     pub column: Option<Column>,
 }
 
-/// The lines of a file, and how many parts have errors.
-pub(super) fn lines(tree: &Node, source: &str) -> (Vec<Line>, usize) {
+/// The lines of a file, and where parts with errors begin.
+pub(super) fn lines(tree: &Node, source: &str) -> (Vec<Line>, Vec<u32>) {
     let mut builder = Builder {
         source,
         lines: Vec::new(),
@@ -48,7 +48,7 @@ pub(super) fn lines(tree: &Node, source: &str) -> (Vec<Line>, usize) {
         starts: true,
         tight: true,
         column: None,
-        left: 0,
+        left: Vec::new(),
         table: false,
     };
     builder.node(tree);
@@ -87,7 +87,8 @@ struct Builder<'a> {
     tight: bool,
     /// What comes begins this column.
     column: Option<Column>,
-    left: usize,
+    /// Where parts with errors begin.
+    left: Vec<u32>,
     /// The next call's arguments are columns.
     table: bool,
 }
@@ -118,7 +119,7 @@ impl<'a> Builder<'a> {
 
     fn node(&mut self, node: &Node) {
         if is_left(node) {
-            self.left += usize::from(node.kind != Kind::Later);
+            self.left.extend((node.kind != Kind::Later).then_some(node.start));
             return self.as_is(node);
         }
         let table = node.kind == Kind::Call && std::mem::take(&mut self.table);

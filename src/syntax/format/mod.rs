@@ -18,6 +18,8 @@ pub struct Formatted {
     pub text: String,
     /// How many parts have errors and were left as they are.
     pub left: usize,
+    /// Where the first of them begins, a byte of the old text.
+    pub first_left: Option<u32>,
 }
 
 /// Formats a `.mech` file; `file` is its index in the source map.
@@ -45,7 +47,7 @@ pub fn format(file: u32, text: &str) -> Result<Formatted, Box<Diagnostic>> {
     let first = if mark.is_empty() && printed.starts_with('\u{FEFF}') { end } else { mark };
     let new = format!("{first}{printed}");
     match difference(&parse.tree, text, &super::parse(file, &new).tree, &new) {
-        None => Ok(Formatted { text: new, left }),
+        None => Ok(Formatted { text: new, left: left.len(), first_left: left.first().copied() }),
         Some(at) => {
             let at = Origin { file, start: at, end: at };
             let message = "the formatter would have changed what this file says; it was left as it is";
