@@ -375,7 +375,7 @@ fn what_is_proposed_fits_the_place() {
         ),
         ("case push {\n        |\n    }", &["load", "minimize", "require"], &["hinge", "for"]),
         ("for i in 0 .. 2 {\n        |\n    }", &["place", "export"], &["load"]),
-        ("export |", &["stl", "3mf", "glb", "ros2"], &["report"]),
+        ("export |", &["stl", "3mf", "glb", "ros2", "report"], &["step"]),
         ("hinge h: |", &["base", "arm"], &["P", "r"]),
         ("hinge h: base to |", &["base", "arm"], &["P"]),
         ("hinge h: base to arm at P as |", &["leaf"], &["rigur", "m"]),

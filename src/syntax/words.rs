@@ -58,7 +58,7 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
 
 /// Those of [`STATEMENT_WORDS`] whose statements a later version will understand.
 const LATER_WORDS: &[&str] =
-    &["fatigue", "hole", "horn", "mount", "plate", "solid", "spring", "stop", "sweep", "tolerance"];
+    &["fatigue", "horn", "mount", "plate", "solid", "spring", "stop", "sweep", "tolerance"];
 
 /// Words that can start a line in a block of a kind, or at the top of a file for [`Kind::File`].
 pub(super) fn starting(block: Kind) -> Vec<&'static str> {

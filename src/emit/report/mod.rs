@@ -139,11 +139,6 @@ impl Report<'_> {
         self.started.iter().any(|path| !path.is_empty())
     }
 
-    /// What the page may load from: nothing.
-    fn connects(&self) -> &'static str {
-        "'none'"
-    }
-
     fn volume(&self) -> String {
         format!("{:.2}", self.plate.parts.iter().map(|p| p.mesh.volume_mm3()).sum::<f64>() / 1000.0)
     }
