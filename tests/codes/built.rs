@@ -173,9 +173,11 @@ mechanism toggle {
 }
 ";
 
+type Find = fn() -> Vec<String>;
+
 /// Cases: code, and what finds all that there is.
-pub fn cases() -> Vec<(&'static str, Box<dyn Fn() -> Vec<String>>)> {
-    let lazy = |f: fn() -> Vec<String>| Box::new(f) as Box<dyn Fn() -> Vec<String>>;
+pub fn cases() -> Vec<(&'static str, Find)> {
+    let lazy = |find: Find| find;
     vec![
         ("W0506", lazy(|| moved(&parallelogram("track(tip)", 11)))),
         ("W0507", lazy(|| moved(KITE))),
