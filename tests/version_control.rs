@@ -221,6 +221,33 @@ fn two_files_are_compared_by_what_they_do() {
     assert!(text(&broken.stderr).contains("E0730"));
 }
 
+/// Only the variant that does something else is told, with what it does.
+#[test]
+fn variants_are_compared_by_what_they_do() {
+    let dir = tempfile::tempdir().unwrap();
+    let with = |wide: &str| {
+        let at = DESIGN.rfind("    export stl").unwrap();
+        let variants = format!("    variant wide {{ r = {wide} }}\n    variant same {{ r = 21 mm }}\n\n");
+        let text = format!("{}{variants}{}", &DESIGN[..at], &DESIGN[at..]);
+        text.replace("cycle 60 steps", "cycle 12 steps")
+    };
+    for (name, wide) in [("old.mech", "22 mm"), ("new.mech", "24 mm")] {
+        std::fs::write(dir.path().join(name), with(wide)).unwrap();
+    }
+    let found = json(&flexura(dir.path(), &["diff", "old.mech", "new.mech", "--format", "json"]));
+    let variants = found["variants"].as_object().unwrap();
+    assert_eq!(variants.keys().collect::<Vec<_>>(), ["wide"], "{found:#}");
+    let rows = variants["wide"]["behaviour"].as_array().unwrap();
+    for name in ["tip, largest error", "largest stress", "volume"] {
+        let row = rows.iter().find(|r| r["name"] == name).unwrap_or_else(|| panic!("{name}: {found:#}"));
+        let [before, after] = ["before", "after"].map(|side| row[side].as_f64().unwrap());
+        assert!((before - after).abs() > 0.01 * before.abs(), "{row}");
+    }
+    let told = text(&flexura(dir.path(), &["diff", "old.mech", "new.mech"]).stdout);
+    let wide = told.split("variant wide").last().unwrap();
+    assert!(wide.contains("tip, largest error") && !told.contains("variant same"), "{told}");
+}
+
 /// A repository with one commit of the example.
 fn repository() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
