@@ -4,6 +4,7 @@
 
 #[path = "codes/built.rs"]
 mod built;
+mod common;
 
 use flexura::diagnostic::{Diagnostic, SourceMap};
 use flexura::elaborate::{Options, elaborate};

@@ -1,8 +1,10 @@
 //! What a build writes for printers, viewers and pages: a small mechanism with every export of its parts, read back.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod common;
+
 use flexura::geometry::{Mesh, check_mesh};
-use flexura::pipeline::{Artefact, BuildOutcome, Compiler, Progress, Request, Show, Stages, build, simulate};
+use flexura::pipeline::{Artefact, BuildOutcome, Compiler, Request, Show, Stages, build, simulate};
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -31,14 +33,6 @@ mechanism flap {
 }
 ";
 
-struct Silent;
-
-impl Progress for Silent {
-    fn seconds(&self) -> f64 {
-        0.0
-    }
-}
-
 fn request() -> Request {
     Request { source: "flap.mech".into(), ..Request::default() }
 }
@@ -47,7 +41,7 @@ fn built(text: &str, threads: usize) -> BuildOutcome {
     let files = BTreeMap::from([("flap.mech".to_string(), text.to_string())]);
     let compiler = Compiler { iterations: 0, ..Compiler::default() };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| build(&request(), &compiler, &files, &Silent, &AtomicBool::new(false)))
+    pool.install(|| build(&request(), &compiler, &files, &common::NoClock, &AtomicBool::new(false)))
 }
 
 fn flap() -> &'static BuildOutcome {
@@ -257,28 +251,7 @@ fn what_cannot_be_printed_well_is_told() {
     let small = small.replace("export stl, stl(assembled), 3mf, sheet, glb, svg, png", "export stl");
     assert_eq!(codes(&built(&small, 1)), ["W0645"]);
     // Two crossed hinges with axes at right angles: their leaves run in three directions.
-    let space = "use std.materials.petg
-use std.processes.fdm
-use std.flexures.crossed_leaves
-
-mechanism wrist {
-    point B = (0 mm, 0 mm)
-    point O = (60 mm, 0 mm)
-    point Q = (120 mm, 0 mm)
-    point P = (180 mm, 0 mm)
-    ground base { B, O }
-    link   fore { O, Q }
-    link   hand { Q, P }
-    hinge nod:  base to fore at O axis z into base toward B as crossed_leaves
-    hinge turn: fore to hand at Q axis (0, 1, 0) into hand toward P as crossed_leaves
-    material petg
-    print on fdm
-    cycle 2 steps over 1 s
-    drive nod from 0 deg to 2 deg
-    drive turn from 0 deg to 2 deg
-    export stl
-}
-";
+    let space = include_str!("exports/wrist.mech");
     let out = built(space, 1);
     let told: Vec<_> = out.diagnostics.iter().filter(|d| d.code == "W0644").collect();
     assert_eq!(told.len(), 1, "{:?}", out.diagnostics);

@@ -11,9 +11,7 @@ use flexura::geometry::{
 };
 use flexura::ir::{Assembly, Design, Placement, Quantity, Realization};
 use flexura::kinematics::solve_motion;
-use flexura::pipeline::{
-    self, Artefact, Between, BuildOutcome, Checked, Compiler, Failed, Files, Iteration, Progress,
-};
+use flexura::pipeline::{self, Artefact, Between, BuildOutcome, Checked, Compiler, Failed, Files, Iteration};
 use flexura::pipeline::{Parts, Request, Show, Simulation, Solved, Stages};
 use nalgebra::Vector3;
 use std::cell::Cell;
@@ -84,17 +82,10 @@ impl Stages for Counted {
     }
 }
 
-struct NoClock;
-impl Progress for NoClock {
-    fn seconds(&self) -> f64 {
-        0.0
-    }
-}
-
 fn build(text: &str, stages: &Counted, lock: Option<String>) -> BuildOutcome {
     let lock = lock.map(|l| ("main.lock".to_string(), l));
     let request = Request { source: "main.mech".into(), lock, ..Request::default() };
-    pipeline::build(&request, stages, &file(text), &NoClock, &AtomicBool::new(false))
+    pipeline::build(&request, stages, &file(text), &common::NoClock, &AtomicBool::new(false))
 }
 
 fn simulated(text: &str, steps: usize, poses: bool) -> Simulation {

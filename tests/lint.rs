@@ -13,14 +13,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-struct Silent;
-
-impl pipeline::Progress for Silent {
-    fn seconds(&self) -> f64 {
-        0.0
-    }
-}
-
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/lint")
 }
@@ -36,7 +28,7 @@ fn run_files(files: &dyn Files, stage: Stage, levels: Levels) -> BuildOutcome {
     let compiler = Compiler { iterations: 1, ..Compiler::default() };
     match stage {
         Stage::Solution | Stage::Parts => {
-            pipeline::build(&request, &compiler, files, &Silent, &AtomicBool::new(false))
+            pipeline::build(&request, &compiler, files, &common::NoClock, &AtomicBool::new(false))
         }
         _ => pipeline::check(&request, &compiler, files),
     }

@@ -6,7 +6,7 @@
 mod common;
 
 use flexura::diagnostic::Diagnostic;
-use flexura::pipeline::{self, Compiler, Progress, Request};
+use flexura::pipeline::{self, Compiler, Request};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -26,20 +26,13 @@ fn nodder(motor: &str, drive: &str, more: &str, exports: &str) -> String {
     text.replace("EXPORTS", exports)
 }
 
-struct NoClock;
-
-impl Progress for NoClock {
-    fn seconds(&self) -> f64 {
-        0.0
-    }
-}
-
 /// Artefacts by name, and findings.
 fn build(text: &str, lock: Option<String>) -> (BTreeMap<String, String>, Vec<Diagnostic>) {
     let files = BTreeMap::from([("main.mech".to_string(), text.to_string())]);
     let lock = lock.map(|l| ("main.lock".to_string(), l));
     let request = Request { source: "main.mech".into(), lock, ..Request::default() };
-    let out = pipeline::build(&request, &Compiler::default(), &files, &NoClock, &AtomicBool::new(false));
+    let out =
+        pipeline::build(&request, &Compiler::default(), &files, &common::NoClock, &AtomicBool::new(false));
     let text = |b: &[u8]| String::from_utf8(b.to_vec()).unwrap();
     (out.artefacts.iter().map(|a| (a.name.clone(), text(&a.bytes))).collect(), out.diagnostics)
 }

@@ -2,8 +2,10 @@
 //! it looks and moves in a browser is the matter of `tests/external/check_report.mjs`.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod common;
+
 use base64::Engine;
-use flexura::pipeline::{BuildOutcome, Compiler, Progress, Request, build};
+use flexura::pipeline::{BuildOutcome, Compiler, Request, build};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -49,19 +51,11 @@ mechanism pair {
 /// Largest error of a coordinate in the page, mm: 16 bits of a box of some 100 mm, and three bits of the turns.
 const COARSE_MM: f64 = 0.02;
 
-struct Silent;
-
-impl Progress for Silent {
-    fn seconds(&self) -> f64 {
-        0.0
-    }
-}
-
 fn built(text: &str) -> BuildOutcome {
     let files = BTreeMap::from([("flap.mech".to_string(), text.to_string())]);
     let request = Request { source: "flap.mech".into(), ..Request::default() };
     let compiler = Compiler { iterations: 0, ..Compiler::default() };
-    build(&request, &compiler, &files, &Silent, &AtomicBool::new(false))
+    build(&request, &compiler, &files, &common::NoClock, &AtomicBool::new(false))
 }
 
 fn page(out: &BuildOutcome) -> &str {

@@ -9,7 +9,7 @@ use clap::Args;
 use flexura::coupon::{BEAMS, Coupon, Fit, fit, readings_to_enter, sheet};
 use flexura::diagnostic::{Diagnostic, Severity, SourceMap};
 use flexura::elaborate::std_modules;
-use flexura::pipeline::{self, Compiler, Progress, Request, placeless};
+use flexura::pipeline::{self, Compiler, Request, placeless};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -44,15 +44,6 @@ pub fn run(arguments: &Arguments) -> u8 {
             render::show(&found, &sources);
             FAILED
         }
-    }
-}
-
-/// The piece is made within a second.
-struct Silent;
-
-impl Progress for Silent {
-    fn seconds(&self) -> f64 {
-        0.0
     }
 }
 
@@ -100,7 +91,7 @@ fn make(coupon: &Coupon, folder: &Path) -> Said {
     let files = BTreeMap::from([("coupon.mech".to_string(), coupon.text.clone())]);
     let request = Request { source: "coupon.mech".into(), ..Request::default() };
     let never = AtomicBool::new(false);
-    let out = pipeline::build(&request, &Compiler::default(), &files, &Silent, &never);
+    let out = pipeline::build(&request, &Compiler::default(), &files, &super::progress::Silent, &never);
     if out.diagnostics.iter().any(Diagnostic::is_error) {
         return Err(out.diagnostics);
     }

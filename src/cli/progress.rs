@@ -43,7 +43,7 @@ impl Terminal {
     }
 }
 
-/// Nothing is shown: several designs are worked on at a time.
+/// Nothing is shown: it is done at once, or several designs are worked on at a time.
 pub struct Silent;
 
 impl Progress for Silent {

@@ -246,13 +246,15 @@ fn carve_body(
     let attached = |f: &FlexureSolid| f.bodies.0 == body || f.bodies.1 == body;
     let mut cuts = Vec::new();
     let mut tools: Vec<(usize, Field, Mesh)> = Vec::new();
+    // The least wall with these tools; it takes longer than all the rest.
+    let mut wall: Option<Wall> = None;
     for flexure in (0..input.flexures.len()).filter(|f| attached(&input.flexures[*f])) {
         let shapes = shapes(input, flexure, body, states);
         let Some(mut cut) = meets(input, plan, body, flexure, &shapes) else { continue };
         let (field, tool) = swept(input, plan, &cut, &shapes);
         tools.push((flexure, field, tool));
         let fields: Vec<(usize, &Field)> = tools.iter().map(|(f, field, _)| (*f, field)).collect();
-        let before = least_wall(plan, &fields[..fields.len() - 1]);
+        let before = wall.unwrap_or_else(|| least_wall(plan, &fields[..fields.len() - 1]));
         let after = least_wall(plan, &fields);
         cut.wall_mm = match after {
             Wall::Apart => None,
@@ -264,6 +266,7 @@ fn carve_body(
             (_, after) => after == Wall::Apart,
         };
         cut.made = !thin;
+        wall = Some(if thin { before } else { after });
         if thin {
             tools.pop();
         }

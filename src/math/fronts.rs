@@ -3,13 +3,11 @@
 //! (redundant constraints among them) waits for the next one, so that no small pivot is ever divided by.
 
 use super::elimination::Elimination;
-use super::ldlt::{Inertia, Ldlt};
+use super::ldlt::{Inertia, Ldlt, in_blocks};
 use nalgebra::DMatrix;
 
 /// A pivot counts if no multiplier becomes larger than the inverse of this.
 const THRESHOLD: f64 = 0.05;
-/// Right-hand sides that are solved for together.
-const BLOCK: usize = 8;
 
 /// The entries of a system: of each front those of its own unknowns with each other and with its boundary.
 #[derive(Clone, Debug)]
@@ -322,19 +320,7 @@ impl Fronts {
     }
 
     fn solve_in_place(&self, b: &mut DMatrix<f64>) {
-        let mut rows = vec![[0.0; BLOCK]; b.nrows()];
-        for first in (0..b.ncols()).step_by(BLOCK) {
-            let width = BLOCK.min(b.ncols() - first);
-            for (i, row) in rows.iter_mut().enumerate() {
-                *row = std::array::from_fn(|c| if c < width { b[(i, first + c)] } else { 0.0 });
-            }
-            self.solve_rows(&mut rows);
-            for (i, row) in rows.iter().enumerate() {
-                for (c, value) in row.iter().enumerate().take(width) {
-                    b[(i, first + c)] = *value;
-                }
-            }
-        }
+        in_blocks(b, |rows| self.solve_rows(rows));
     }
 
     fn solve_rows<const N: usize>(&self, b: &mut [[f64; N]]) {
@@ -504,6 +490,7 @@ fn eliminate_two(a: &mut DMatrix<f64>, k: usize) {
 #[cfg(test)]
 mod tests {
     use super::super::elimination::{NODE, Pair};
+    use super::super::ldlt::BLOCK;
     use super::*;
     use nalgebra::SymmetricEigen;
 

@@ -7,7 +7,24 @@ use nalgebra::DMatrix;
 const ALPHA: f64 = 0.640_388_203_202_208;
 
 /// Right-hand sides that are solved for together.
-const BLOCK: usize = 8;
+pub(super) const BLOCK: usize = 8;
+
+/// Solves for every column of `b` in place, [`BLOCK`] at a time.
+pub(super) fn in_blocks(b: &mut DMatrix<f64>, solve: impl Fn(&mut [[f64; BLOCK]])) {
+    let mut rows = vec![[0.0; BLOCK]; b.nrows()];
+    for first in (0..b.ncols()).step_by(BLOCK) {
+        let width = BLOCK.min(b.ncols() - first);
+        for (i, row) in rows.iter_mut().enumerate() {
+            *row = std::array::from_fn(|c| if c < width { b[(i, first + c)] } else { 0.0 });
+        }
+        solve(&mut rows);
+        for (i, row) in rows.iter().enumerate() {
+            for (c, value) in row.iter().enumerate().take(width) {
+                b[(i, first + c)] = *value;
+            }
+        }
+    }
+}
 
 /// Number of positive, negative and zero pivots: by Sylvester's law those of the eigenvalues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -95,19 +112,7 @@ impl Ldlt {
 
     /// Solves A x = b for each column of `b` in place. Zero pivots give zero components.
     pub fn solve_in_place(&self, b: &mut DMatrix<f64>) {
-        let mut rows = vec![[0.0; BLOCK]; b.nrows()];
-        for first in (0..b.ncols()).step_by(BLOCK) {
-            let width = BLOCK.min(b.ncols() - first);
-            for (i, row) in rows.iter_mut().enumerate() {
-                *row = std::array::from_fn(|c| if c < width { b[(i, first + c)] } else { 0.0 });
-            }
-            self.solve_rows(&mut rows);
-            for (i, row) in rows.iter().enumerate() {
-                for (c, value) in row.iter().enumerate().take(width) {
-                    b[(i, first + c)] = *value;
-                }
-            }
-        }
+        in_blocks(b, |rows| self.solve_rows(rows));
     }
 
     /// Solves for `N` right-hand sides in place, of which `b` has the rows.

@@ -115,7 +115,10 @@ impl Lower<'_> {
     /// `a op b op c`, grouped from the left. Each result spans its operands.
     fn chain(&mut self, node: &Node) -> Option<(Expr, u32)> {
         let mut parts = node.parts();
-        let (mut left, mut depth) = self.measured(parts.next()?);
+        // Parentheses are parts of the text, not of the expression inside them.
+        let first = parts.next()?;
+        let mut at = self.origin(first);
+        let (mut left, mut depth) = self.measured(first);
         while let (Some(operator), Some(right)) = (parts.next(), parts.next()) {
             let operator = match self.text(operator) {
                 "+" => BinaryOp::Add,
@@ -124,9 +127,8 @@ impl Lower<'_> {
                 "/" => BinaryOp::Divide,
                 _ => BinaryOp::Power,
             };
+            at.end = self.origin(right).end;
             let (right, d) = self.measured(right);
-            let mut at = left.at;
-            at.end = right.at.end;
             depth = depth.max(d) + 1;
             left = Expr { kind: ExprKind::Binary(operator, Box::new(left), Box::new(right)), at };
         }

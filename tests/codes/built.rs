@@ -1,17 +1,9 @@
 //! Findings of what is solved, built, locked and compared: small designs that show them within a moment.
 
-use super::{changed, told};
-use flexura::pipeline::{self, BuildOutcome, Compiler, Extent, Progress, Request, Show, Values};
+use super::{changed, common, told};
+use flexura::pipeline::{self, BuildOutcome, Compiler, Extent, Request, Show, Values};
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
-
-struct NoClock;
-
-impl Progress for NoClock {
-    fn seconds(&self) -> f64 {
-        0.0
-    }
-}
 
 fn files(text: &str) -> BTreeMap<String, String> {
     BTreeMap::from([("main.mech".to_string(), text.to_string())])
@@ -27,7 +19,7 @@ fn built(text: &str, lock: Option<&str>, change: impl FnOnce(&mut Request)) -> B
     let mut request = Request { source: "main.mech".into(), lock, ..Request::default() };
     change(&mut request);
     let compiler = Compiler { iterations: 0, ..Compiler::default() };
-    pipeline::build(&request, &compiler, &files(text), &NoClock, &AtomicBool::new(false))
+    pipeline::build(&request, &compiler, &files(text), &common::NoClock, &AtomicBool::new(false))
 }
 
 fn at_start(text: &str) -> Vec<String> {
@@ -126,25 +118,7 @@ const SLIDING: &str =
 ";
 
 /// Two crossed hinges with axes at right angles: their leaves run in three directions.
-const WRIST: &str =
-    "use std.materials.petg\nuse std.processes.fdm\nuse std.flexures.crossed_leaves\nmechanism wrist {
-    point B = (0 mm, 0 mm)
-    point O = (60 mm, 0 mm)
-    point Q = (120 mm, 0 mm)
-    point P = (180 mm, 0 mm)
-    ground base { B, O }
-    link   fore { O, Q }
-    link   hand { Q, P }
-    hinge nod:  base to fore at O axis z into base toward B as crossed_leaves
-    hinge turn: fore to hand at Q axis (0, 1, 0) into hand toward P as crossed_leaves
-    material petg
-    print on fdm
-    cycle 2 steps over 1 s
-    drive nod from 0 deg to 2 deg
-    drive turn from 0 deg to 2 deg
-    export stl
-}
-";
+const WRIST: &str = include_str!("../exports/wrist.mech");
 
 /// A body between two leaves, smaller than what they sweep; pressed, it goes down between them.
 const TOGGLE: &str = "edition 1
@@ -223,7 +197,7 @@ pub fn cases() -> Vec<(&'static str, Find)> {
             lazy(|| {
                 let request = Request { source: "main.mech".into(), ..Request::default() };
                 let (files, stopped) = (files(&short(&[])), AtomicBool::new(true));
-                all(&pipeline::build(&request, &Compiler::default(), &files, &NoClock, &stopped))
+                all(&pipeline::build(&request, &Compiler::default(), &files, &common::NoClock, &stopped))
             }),
         ),
         (
