@@ -3,8 +3,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use flexura::elaborate::{Options, elaborate};
-use flexura::equilibrium::{Cycle, Layout, Model, SensitivityWorkspace, sweep};
-use flexura::ir::Design;
+use flexura::equilibrium::{
+    Cycle, Layout, Model, SAME_MM, SensitivityWorkspace, apart_mm, sweep, sweep_both_ways,
+};
+use flexura::ir::{Design, Profile};
 use flexura::kinematics::solve_motion;
 use flexura::optimize::Problem;
 
@@ -94,6 +96,32 @@ fn the_way_does_not_matter() {
             assert!((x.rotation - y.rotation).norm() < 1e-8, "state {s}");
         }
     }
+}
+
+/// A closed cycle followed both ways round holds the same states; its last one is its first, a turn on. An open one is followed as it is.
+#[test]
+fn both_ways_round_lead_to_the_same_states() {
+    let design = chebyshev(24);
+    let (layout, p) = (layout(&design), start(&design));
+    let model = Model::new(&design, &layout, &p, EDGES, false).unwrap();
+    let (one, both) = (sweep(&model).unwrap().states, sweep_both_ways(&model).unwrap().states);
+    assert_eq!(one.len(), both.len());
+    for (s, (a, b)) in one.iter().zip(&both).enumerate() {
+        let apart = apart_mm(&layout, &a.state, &b.state);
+        assert!(apart < SAME_MM / 10.0, "state {s}: {apart:e}");
+        assert!((a.state.drives[0] - b.state.drives[0]).abs() < 1e-9, "state {s}");
+        assert!((a.drive_load(&model, 0) - b.drive_load(&model, 0)).abs() < 1e-5, "state {s}");
+    }
+    let (first, last) = (&both[0].state, &both[24].state);
+    assert_eq!((&first.poses, &first.lambda), (&last.poses, &last.lambda));
+    assert!((last.drives[0] - first.drives[0] - std::f64::consts::TAU).abs() < 1e-12);
+    let mut open = design.clone();
+    let Profile::Range { to, .. } = &mut open.drives[0].profile else { panic!("a straight profile") };
+    *to *= 0.5;
+    let layout = self::layout(&open);
+    let model = Model::new(&open, &layout, &p, EDGES, false).unwrap();
+    let (one, both) = (sweep(&model).unwrap().states, sweep_both_ways(&model).unwrap().states);
+    assert!(one.iter().zip(&both).all(|(a, b)| a.state.poses == b.state.poses));
 }
 
 /// Every parameter in the extended set, every fourth in the ordinary one.

@@ -31,6 +31,6 @@ pub use load::{PointForce, PointForceChange};
 pub use model::{Model, ModelError, ModelRod, State};
 pub use newton::{Equilibrium, SolveError, Solver};
 pub use sensitivity::{Sensitivity, SensitivityWorkspace};
-pub use sweep::{Cycle, SweepError, sweep};
+pub use sweep::{Cycle, SAME_MM, SweepError, apart_mm, sweep, sweep_both_ways};
 pub use target::{LayoutDirection, LayoutTrace, angle_between};
 pub use weight::volume_and_center;

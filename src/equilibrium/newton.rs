@@ -26,6 +26,11 @@ const ROTATION_STEP_RAD: f64 = 0.4;
 /// Largest displacement of a link in one iteration, in lever lengths.
 const TRANSLATION_STEP: f64 = 0.5;
 
+/// After a full step the Hessian is that of a state so near that a step with its factors, at a fifth of the cost of new ones, leaves about
+/// 2 r₁²/r₀ of residuals r₀ and r₁ before and after it. It is taken where that is below this part of the tolerance: 0.01, 0.1 and 0.5 take the
+/// same iterations in the cycles of all examples.
+const CHORD: f64 = 0.1;
+
 /// Why no equilibrium was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SolveError {
@@ -95,6 +100,12 @@ struct Residual {
 impl Residual {
     fn small(&self) -> bool {
         self.force_n <= self.tolerance_n && self.constraint_mm <= CONSTRAINT_MM
+    }
+
+    /// Whether one more step with the same factors does, after a full one that brought the force down from `before_n`.
+    fn serves_a_chord(&self, before_n: f64) -> bool {
+        let left_n = 2.0 * self.force_n.powi(2) / before_n;
+        left_n <= CHORD * self.tolerance_n && self.constraint_mm <= CONSTRAINT_MM
     }
 }
 
@@ -199,6 +210,8 @@ impl Solver {
         target: &[f64],
         limit: usize,
     ) -> Result<Equilibrium, SolveError> {
+        // Force residual before a full step with the factors at hand.
+        let mut before: Option<f64> = None;
         for iteration in 0..limit {
             let residual = self.assemble(model, &mut state, target);
             if !(residual.force_n.is_finite() && residual.constraint_mm.is_finite()) {
@@ -221,13 +234,21 @@ impl Solver {
                     iterations: iteration,
                 });
             }
-            self.factor(model, &state, false);
+            let chord = before.take().is_some_and(|r| residual.serves_a_chord(r));
+            if chord {
+                self.systems.iter_mut().for_each(|s| {
+                    s.condense_gradient();
+                });
+            } else {
+                self.factor(model, &state, false);
+            }
             let step = self.newton_step(model, &state, target);
             if step.iter().any(|v| !v.is_finite()) {
                 return Err(SolveError::NotFinite);
             }
             let fraction = step_fraction(model, &step);
-            self.advance(model, &mut state, &step, fraction)?;
+            let taken = self.advance(model, &mut state, &step, fraction)?;
+            before = (!chord && taken >= 1.0).then_some(residual.force_n);
         }
         Err(SolveError::NotConverged)
     }
@@ -300,14 +321,14 @@ impl Solver {
         rhs
     }
 
-    /// Moves the state along `step` (links, multipliers) with the rods following.
+    /// Moves the state along `step` (links, multipliers) with the rods following; by which fraction.
     fn advance(
         &mut self,
         model: &Model,
         state: &mut State,
         step: &DVector<f64>,
         fraction: f64,
-    ) -> Result<(), SolveError> {
+    ) -> Result<f64, SolveError> {
         let inside: Vec<Vec<f64>> = model
             .rods
             .iter()
@@ -322,7 +343,7 @@ impl Solver {
                 for (rod, system) in model.rods.iter().zip(&mut self.systems) {
                     system.expect(&rod.rod, fraction);
                 }
-                return Ok(());
+                return Ok(fraction);
             }
             fraction *= 0.5;
         }

@@ -6,7 +6,7 @@ use super::load::{PointForce, PointForceChange};
 use super::model::{Model, State};
 use super::newton::{Equilibrium, SolveError, Solver};
 use super::saddle::scatter;
-use crate::rod::{CentrelineJacobian, StrainJacobian};
+use crate::rod::{EdgeJacobian, StrainJacobian};
 use nalgebra::{DMatrix, DVector};
 
 /// First derivatives of one equilibrium by the n design parameters.
@@ -17,26 +17,17 @@ pub struct Sensitivity {
     pub links: DMatrix<f64>,
     /// Multipliers, rows × n.
     pub lambda: DMatrix<f64>,
-    /// Per rod where it is, by the n; empty unless asked for ([`SensitivityWorkspace::with_centrelines`]).
-    pub centrelines: Vec<CentrelineJacobian>,
 }
 
 /// Reused by one thread.
 pub struct SensitivityWorkspace {
     solver: Solver,
-    centrelines: bool,
 }
 
 impl SensitivityWorkspace {
     /// For models of this size.
     pub fn new(model: &Model) -> Self {
-        Self { solver: Solver::new(model), centrelines: false }
-    }
-
-    /// The same, with the derivatives of the centrelines if `wanted`.
-    pub fn with_centrelines(mut self, wanted: bool) -> Self {
-        self.centrelines = wanted;
-        self
+        Self { solver: Solver::new(model) }
     }
 
     /// Derivatives at an accepted equilibrium with the drives held.
@@ -113,22 +104,20 @@ impl SensitivityWorkspace {
             column -= by;
         }
         solver.solve_scaled_block(&mut rhs);
-        let mut centrelines = Vec::new();
-        for (rod, system) in model.rods.iter().zip(&solver.systems).filter(|_| self.centrelines) {
-            let mut links = DMatrix::zeros(12, parameters);
-            for (half, body) in rod.bodies.into_iter().enumerate() {
-                if let Some(first) = model.layout.bodies[body].first_dof {
-                    links.rows_mut(6 * half, 6).copy_from(&rhs.rows(first, 6));
-                }
+        Ok(Sensitivity { links: rhs.rows(0, n).into_owned(), lambda: rhs.rows(n, m).into_owned() })
+    }
+
+    /// Derivatives of an edge of a rod by the n, at the equilibrium last asked for, of which `at` is the sensitivity; none where
+    /// there is no such edge.
+    pub fn edge(&self, model: &Model, at: &Sensitivity, rod: usize, edge: usize) -> Option<EdgeJacobian> {
+        let (system, rod) = (self.solver.systems.get(rod)?, model.rods.get(rod)?);
+        let mut links = DMatrix::zeros(12, at.links.ncols());
+        for (half, body) in rod.bodies.into_iter().enumerate() {
+            if let Some(first) = model.layout.bodies[body].first_dof {
+                links.rows_mut(6 * half, 6).copy_from(&at.links.rows(first, 6));
             }
-            let jacobian = system.centreline_jacobian(&rod.rod, &links, &rod.dq_dp);
-            centrelines.push(jacobian.map_err(|_| SolveError::NoDerivatives)?);
         }
-        Ok(Sensitivity {
-            links: rhs.rows(0, n).into_owned(),
-            lambda: rhs.rows(n, m).into_owned(),
-            centrelines,
-        })
+        system.edge_jacobian(&rod.rod, edge, &links, &rod.dq_dp).ok()
     }
 
     /// Strain measures of one rod at the equilibrium last asked for, with their derivatives by the rod's own 31

@@ -89,7 +89,7 @@ fn aligned(a: &Slot, b: &Slot) -> Option<Separation> {
         Vector3::zeros()
     };
     let at = p + along + axis * between(up.abs(), a.half_height_mm, b.half_height_mm).copysign(up);
-    Some(Separation { gap_mm: aside.hypot(above) - balls, at })
+    Some(Separation { gap_mm: (aside * aside + above * above).sqrt() - balls, at })
 }
 
 /// Points of two segments that are closest seen along an axis, which both are normal to.

@@ -110,7 +110,7 @@ impl Slot {
         let up = off.dot(&self.axis);
         let x = (off - self.axis * up).norm() - self.disc_radius_mm;
         let y = up.abs() - self.half_height_mm;
-        x.max(0.0).hypot(y.max(0.0)) + x.max(y).min(0.0) - self.round_mm
+        (x.max(0.0).powi(2) + y.max(0.0).powi(2)).sqrt() + x.max(y).min(0.0) - self.round_mm
     }
 
     /// Half the size of the bounding box of a slot without length, mm.

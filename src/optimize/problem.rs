@@ -5,7 +5,8 @@ use super::guards;
 use super::normal::Normal;
 use super::objectives::{self, Level, StateView, StatesSensitivity, Term};
 use crate::equilibrium::{
-    Cycle, Equilibrium, Layout, Model, PointForce, PointForceChange, SensitivityWorkspace, Solver, sweep,
+    Cycle, Equilibrium, Layout, Model, PointForce, PointForceChange, SensitivityWorkspace, Solver,
+    sweep_both_ways,
 };
 use crate::geometry::{SkeletonCapsule, parts_input, plan_bodies, skeleton_capsules};
 use crate::ir::Design;
@@ -197,7 +198,7 @@ impl<'d> Problem<'d> {
             Cow::Owned(layout) => objectives::build(self.design, layout).1,
         };
         let model = Model::new(self.design, layout, &p, self.edges, true).ok()?;
-        let cycle = sweep(&model).ok()?;
+        let cycle = sweep_both_ways(&model).ok()?;
         let loaded = self.load(&model, &cycle, &cases)?;
         let capsules = self.links(&model)?;
         let views: Vec<StateView> = (0..self.layout.counted_states())
@@ -330,7 +331,7 @@ impl<'d> Problem<'d> {
         let parts: Vec<Option<Vec<Normal>>> = (0..self.layout.counted_states())
             .into_par_iter()
             .map_init(
-                || SensitivityWorkspace::new(&trial.model).with_centrelines(self.needs_links),
+                || SensitivityWorkspace::new(&trial.model),
                 |workspace, s| {
                     let target = target(&trial.model, s);
                     let view = self.view(&trial.model, &trial.cycle, &trial.loaded, &trial.capsules, s);

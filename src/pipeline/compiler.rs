@@ -15,13 +15,13 @@ use crate::diagnostic::{Diagnostic, Origin};
 use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
 use crate::equilibrium::{
-    Cycle, Equilibrium, Layout, LayoutTrace, Model, ModelError, PointForce, Solver, SweepError, load_factors,
-    sweep,
+    Cycle, Equilibrium, Layout, LayoutTrace, Model, ModelError, PointForce, SAME_MM, Solver, SweepError,
+    apart_mm, load_factors, sweep,
 };
 use crate::geometry::{follows_geometry, parts_input};
 use crate::ir::expr::Node;
 use crate::ir::{Assembly, Design, DriveOn, ObjectiveKind, Profile, Solution};
-use crate::kinematics::{Constraint, Motion, solve_motion};
+use crate::kinematics::{Motion, solve_motion};
 use crate::math::{Pose, log_so3};
 use crate::optimize::{self, Ending, Method, Problem};
 use nalgebra::Vector3;
@@ -31,8 +31,6 @@ use std::sync::atomic::AtomicBool;
 pub const EDGES: usize = 20;
 /// Edges of a rod in the printed part, for smooth sides.
 const MESH_EDGES: usize = 48;
-/// States 0 and N of a closed cycle agree to this, mm and rad; a different branch differs by far more.
-const RETURNED: f64 = 1e-6;
 
 /// See the module.
 #[derive(Clone, Copy, Debug)]
@@ -542,17 +540,7 @@ pub(super) fn judge(design: &Design, layout: &Layout, cycle: &Cycle) -> Vec<Diag
         );
     }
     if let (true, Some(first), Some(last)) = (layout.closed, cycle.states.first(), cycle.states.last()) {
-        let idle = |body: usize| {
-            let gauge = |c: &Constraint| matches!(c, Constraint::Gauge { body: b, .. } if *b == body);
-            layout.constraints.iter().any(gauge)
-        };
-        let pairs = first.state.poses.iter().zip(&last.state.poses).enumerate();
-        let apart = pairs.map(|(body, (a, b))| {
-            // How far a body has turned idly means nothing.
-            let turned = if idle(body) { 0.0 } else { (a.rotation - b.rotation).norm() };
-            (a.translation - b.translation).norm().max(turned)
-        });
-        if apart.fold(0.0, f64::max) > RETURNED {
+        if apart_mm(layout, &first.state, &last.state) > SAME_MM {
             found.push(
                 Diagnostic::warning("W0604", "after a whole cycle the mechanism is not where it began", design.origin)
                     .help("it snaps from one equilibrium to another on the way: see the energy in `flexura simulate`"),

@@ -104,18 +104,8 @@ impl RodSystem {
         }
         let n = self.factors.order();
         let b = self.coupling(1);
-        let mut residual = std::mem::take(&mut self.reduced_gradient);
-        residual.resize(n + HALF_BANDWIDTH, [0.0; 1]);
-        for (to, from) in residual.iter_mut().zip(&self.gradient[FIRST_INTERNAL..4 * self.n - 4]) {
-            to[0] = *from;
-        }
-        residual[n..].fill([0.0; 1]);
-        self.factors.forward(&mut residual, 0);
-        for (row, [g]) in self.reduced.iter_mut().zip(&residual) {
-            *row = [0.0; 8];
-            row[6] = *g;
-        }
-        self.reduced_gradient = residual;
+        self.reduced.fill([0.0; 8]);
+        self.forward_gradient();
         self.forward_b(&b);
         let inverse = self.factors.inverse_pivots();
         let first_b = n - END_COUPLING;
@@ -137,6 +127,47 @@ impl RodSystem {
         let mut hessian: SMatrix<f64, 6, 6> = self.link_hessian.fixed_view::<6, 6>(6, 6).into();
         hessian -= (bb + bb.transpose()) * 0.5;
         (gradient, (hessian + hessian.transpose()) * 0.5)
+    }
+
+    /// Condenses the gradient of the state assembled last with the factors of the one before it: all that a step with the
+    /// former Hessian needs. [`Self::back_substitute`] then serves that step. Call after [`Self::condense`] or
+    /// [`Self::condense_end`] and one more assembly.
+    pub fn condense_gradient(&mut self) -> &SVector<f64, 12> {
+        self.forward_gradient();
+        let first_b = self.factors.order() - END_COUPLING;
+        let inverse = self.factors.inverse_pivots();
+        self.condensed_gradient = self.link_gradient;
+        for (y, d) in self.reduced.iter().zip(inverse) {
+            let s = y[6] * d;
+            for (to, y) in self.condensed_gradient.iter_mut().zip(&y[..6]) {
+                *to -= s * y;
+            }
+        }
+        let last = self.reduced[first_b..].iter().zip(&inverse[first_b..]);
+        for ((y, d), yb) in last.zip(&self.reduced_b) {
+            let s = y[6] * d;
+            for (to, y) in self.condensed_gradient.iter_mut().skip(6).zip(yb) {
+                *to -= s * y;
+            }
+        }
+        self.condense_shear_gradient();
+        &self.condensed_gradient
+    }
+
+    /// L⁻¹ of the internal gradient.
+    fn forward_gradient(&mut self) {
+        let n = self.factors.order();
+        let mut residual = std::mem::take(&mut self.reduced_gradient);
+        residual.resize(n + HALF_BANDWIDTH, [0.0; 1]);
+        for (to, from) in residual.iter_mut().zip(&self.gradient[FIRST_INTERNAL..4 * self.n - 4]) {
+            to[0] = *from;
+        }
+        residual[n..].fill([0.0; 1]);
+        self.factors.forward(&mut residual, 0);
+        for (row, [g]) in self.reduced.iter_mut().zip(&residual) {
+            row[6] = *g;
+        }
+        self.reduced_gradient = residual;
     }
 
     /// Condenses what is in the band; with shear, [`Self::factor_shear`] goes on from there.

@@ -212,6 +212,18 @@ fn condensation_of(options: RodOptions) {
     assert_eq!(ch, ch.transpose());
     let d = SVector::<f64, 12>::from_fn(|i, _| (i as f64).sin());
     let x = system.back_substitute(&d);
+    let want = -(&inverse * (g.rows(0, n) + &c * d));
+    for i in 0..n {
+        assert!((x[i] - want[i]).abs() < 1e-8 * want.amax());
+    }
+    // A step at another state with the factors of this one.
+    let other = sample_of(8, 9, options);
+    system.assemble(&sample.rod, &other.state, &other.a, &other.b);
+    let (g, _) = dense(&system);
+    let cg = *system.condense_gradient();
+    let want_g = g.rows(n, 12) - c.transpose() * &inverse * g.rows(0, n);
+    assert!((cg - &want_g).amax() < 1e-9 * want_g.amax(), "{:e}", (cg - &want_g).amax() / want_g.amax());
+    let x = system.back_substitute(&d);
     let want = -(inverse * (g.rows(0, n) + &c * d));
     for i in 0..n {
         assert!((x[i] - want[i]).abs() < 1e-8 * want.amax());

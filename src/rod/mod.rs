@@ -42,7 +42,7 @@
 //! Per iteration: [`RodSystem::assemble`], [`RodSystem::factor`], [`RodSystem::condense`], solve for the
 //! links, [`RodSystem::back_substitute`], [`Rod::retract`]. At an equilibrium of a rod made by
 //! [`Rod::with_derivatives`]: [`RodSystem::parameter_columns`], [`RodSystem::internal_sensitivity`] (or, transposed,
-//! [`RodSystem::internal_pull_back`]), [`RodSystem::strain_jacobian`], [`RodSystem::centreline_jacobian`].
+//! [`RodSystem::internal_pull_back`]), [`RodSystem::strain_jacobian`], [`RodSystem::edge_jacobian`].
 //!
 //! # Options
 //!
@@ -75,7 +75,7 @@ mod weight;
 
 pub use crate::ir::RodModel;
 pub use assemble::RodSystem;
-pub use centreline::CentrelineJacobian;
+pub use centreline::EdgeJacobian;
 pub use condense::FactorReport;
 pub use expected::RodForces;
 pub use options::{Corrections, RestFrames, RodOptions};

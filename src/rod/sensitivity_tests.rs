@@ -137,9 +137,11 @@ fn check(build: impl Fn(&RodParameters) -> SingleRod, free: bool) {
         d_link.rows_mut(6, 6).copy_from(&d);
     }
     let d_internal = s.system.internal_sensitivity(&d_link, &dq).unwrap();
-    let centreline = s.system.centreline_jacobian(&s.rod, &d_link, &dq).unwrap();
     let derivatives = s.system.strain_jacobian(&s.rod).unwrap();
     let edges = s.rod.edges();
+    let line: Vec<_> = (0..edges).map(|j| s.system.edge_jacobian(&s.rod, j, &d_link, &dq).unwrap()).collect();
+    assert!(line.windows(2).all(|e| e[0].vertices[1] == e[1].vertices[0]));
+    let vertex = |j: usize| if j < edges { &line[j].vertices[0] } else { &line[j - 1].vertices[1] };
     let stations = edges + 1;
     let base = results(&s);
     for k in 0..PARAMETERS {
@@ -147,12 +149,12 @@ fn check(build: impl Fn(&RodParameters) -> SingleRod, free: bool) {
         for j in 2..=edges - 2 {
             for c in 0..3 {
                 let inner = d_internal[(4 * j - 7 + c, k)];
-                assert!((inner - centreline.vertices[j][(c, k)]).abs() <= 1e-12 * inner.abs());
+                assert!((inner - vertex(j)[(c, k)]).abs() <= 1e-12 * inner.abs());
             }
         }
         let frames = base.len() - 3 * edges;
         for c in 0..3 {
-            want.extend((0..=edges).map(|j| (3 * j + c, centreline.vertices[j][(c, k)])));
+            want.extend((0..=edges).map(|j| (3 * j + c, vertex(j)[(c, k)])));
         }
         let pose = 3 * (edges + 1);
         for c in 0..3 {
@@ -169,7 +171,7 @@ fn check(build: impl Fn(&RodParameters) -> SingleRod, free: bool) {
         }
         let turned: Vec<(usize, f64)> = (0..edges)
             .flat_map(|j| (0..3).map(move |c| (j, c)))
-            .map(|(j, c)| (frames + 3 * j + c, centreline.m2[j][(c, k)]))
+            .map(|(j, c)| (frames + 3 * j + c, line[j].m2[(c, k)]))
             .collect();
         let dq = step_of(k);
         let samples: Vec<Vec<f64>> =

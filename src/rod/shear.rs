@@ -270,6 +270,22 @@ impl RodSystem {
         report
     }
 
+    /// The share of slip and force in [`Self::condense_gradient`].
+    pub(crate) fn condense_shear_gradient(&mut self) {
+        let Some(shear) = self.shear.as_deref_mut() else { return };
+        let mut gradient = shear.force_gradient;
+        for ((y, z), d) in shear.reduced.iter().zip(&self.reduced).zip(self.factors.inverse_pivots()) {
+            let s = z[6] * d;
+            for (to, y) in gradient.iter_mut().zip(y) {
+                *to -= s * y;
+            }
+        }
+        let condensed: Vector3<f64> = self.condensed_gradient.fixed_rows::<3>(6).into_owned();
+        shear.gradient.fixed_rows_mut::<3>(0).copy_from(&(shear.force - condensed));
+        shear.gradient.fixed_rows_mut::<3>(3).copy_from(&gradient);
+        self.condensed_gradient -= shear.coupling.transpose() * (shear.inverse * shear.gradient);
+    }
+
     /// Increments of slip and force for the links' `d`, which becomes the chain's, and for `share` of the gradient.
     pub(crate) fn shear_increment(&self, d: &mut SVector<f64, 12>, share: f64) -> Option<Vector6> {
         let shear = self.shear.as_deref()?;

@@ -22,7 +22,7 @@ mod several;
 pub use several::Head;
 
 /// Raised whenever the solver would find something else for the same design.
-pub const SOLVER_VERSION: &str = "7";
+pub const SOLVER_VERSION: &str = "8";
 const TITLE: &str = "# flexura lock 1";
 
 /// How a damaged lock is mended; said with every error of this file.

@@ -172,7 +172,7 @@ impl Objective for Collision {
                     }
                     Source::Rod(r, e) => {
                         if edges[r][e].is_none() {
-                            edges[r][e] = rod_jacobian(view.model, &at.free, r, e);
+                            edges[r][e] = rod_jacobian(view.model, at, r, e);
                         }
                         if let Some(jacobian) = &edges[r][e] {
                             by.chain(jacobian, &mut row);

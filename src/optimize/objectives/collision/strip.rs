@@ -6,6 +6,7 @@ use super::kernel::{GAUSS_3, near};
 use crate::equilibrium::{Model, Sensitivity};
 use crate::geometry::SkeletonCapsule;
 use crate::math::{Pose, skew};
+use crate::optimize::objectives::StatesSensitivity;
 use crate::rod::{Rod, RodState, SectionShape};
 use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
 
@@ -196,16 +197,16 @@ fn spread(shape: SectionShape, a: f64, b: f64) -> f64 {
 }
 
 /// Derivatives of the strip of edge `j` of rod `r` by the n design parameters, 11 × n.
-pub fn rod_jacobian(model: &Model, at: &Sensitivity, r: usize, j: usize) -> Option<DMatrix<f64>> {
-    let (rod, line) = (model.rods.get(r)?, at.centrelines.get(r)?);
-    let (first, second) = (line.vertices.get(j)?, line.vertices.get(j + 1)?);
+pub fn rod_jacobian(model: &Model, at: &StatesSensitivity, r: usize, j: usize) -> Option<DMatrix<f64>> {
+    let (rod, edge) = (model.rods.get(r)?, at.workspace.edge(model, &at.free, r, j)?);
+    let [first, second] = &edge.vertices;
     let mut out = DMatrix::zeros(NUMBERS, first.ncols());
     let middle = || (first + second) * 0.5;
     let start = if j == 0 { middle() } else { first.clone() };
-    let end = if j + 2 == line.vertices.len() { middle() } else { second.clone() };
+    let end = if j + 1 == rod.rod.edges() { middle() } else { second.clone() };
     out.rows_mut(0, 3).copy_from(&start);
     out.rows_mut(3, 3).copy_from(&end);
-    out.rows_mut(6, 3).copy_from(line.m2.get(j)?);
+    out.rows_mut(6, 3).copy_from(&edge.m2);
     let [a, b] = rod.rod.edge_half_widths_mm(j);
     let u = rod.rod.taper_at_edge(j);
     let by = |from: usize, to: usize| rod.dq_dp.row(from) * (1.0 - u) + rod.dq_dp.row(to) * u;
