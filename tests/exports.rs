@@ -3,6 +3,7 @@
 
 mod common;
 
+use dxf::{Drawing, entities::EntityType, enums::Units};
 use flexura::geometry::{Mesh, check_mesh};
 use flexura::pipeline::{Artefact, BuildOutcome, Compiler, Request, Show, Stages, build, simulate};
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3};
@@ -202,6 +203,42 @@ fn the_archive_has_no_times_in_it() {
     assert_eq!(&archive[..4], b"PK\x03\x04");
     // Time and date of the first file: 0:00:00 on 1 January 1980.
     assert_eq!(&archive[10..14], [0, 0, 0x21, 0]);
+}
+
+/// A part of plates is told whole by its outlines: they enclose its volume, holes left out. One with a leaf of elliptic section is not.
+#[test]
+fn outlines_of_plates_enclose_the_part() {
+    let out = built(include_str!("exports/plates.mech"), 1);
+    assert!(codes(&out).is_empty(), "{:?}", out.diagnostics);
+    let bytes = |name: &str| &out.artefacts.iter().find(|a| a.name == name).unwrap().bytes;
+    let drawing = Drawing::load(&mut std::io::Cursor::new(bytes("plates_base.dxf"))).unwrap();
+    assert_eq!(drawing.header.default_drawing_units, Units::Millimeters);
+    let (mut volume, mut least, mut round) = (0.0, f64::INFINITY, 0);
+    for entity in drawing.entities() {
+        let EntityType::LwPolyline(line) = &entity.specific else { panic!("{entity:?}") };
+        assert!(line.is_closed() && line.vertices.len() >= 3);
+        let [low, high] = entity
+            .common
+            .layer
+            .trim_start_matches("z ")
+            .trim_end_matches(" mm")
+            .split_once(" to ")
+            .map(|(a, b)| [a, b].map(|x| x.parse::<f64>().unwrap()))
+            .unwrap();
+        let next = line.vertices.iter().cycle().skip(1);
+        let area: f64 = line.vertices.iter().zip(next).map(|(p, q)| 0.5 * (p.x * q.y - p.y * q.x)).sum();
+        volume += area * (high - low);
+        round += usize::from(area < 0.0);
+        least = line.vertices.iter().fold(least, |least, v| least.min(v.x).min(v.y));
+    }
+    let part = check_mesh(&read_stl(bytes("plates_base.stl")));
+    // Rounded rims are not cut.
+    let rims = volume / part.volume_mm3 - 1.0;
+    assert!((0.0..0.03).contains(&rims), "{volume} of {}", part.volume_mm3);
+    assert!(round >= 1, "the hole is an outline of its own, the other way round");
+    assert!(least.abs() < 1e-4, "where the part lies: {least}");
+    let bent = built(&FLAP.replace("export stl, stl(assembled), 3mf, sheet, glb, svg, png", "export dxf"), 1);
+    assert_eq!(codes(&bent), ["W0649"]);
 }
 
 #[test]

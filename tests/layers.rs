@@ -50,6 +50,8 @@ fn each_dependency_is_seen_by_one_folder() {
         ("gltf_json", "emit/glb/"),
         ("threemf2", "emit/"),
         ("png", "emit/"),
+        ("dxf", "emit/"),
+        ("chrono", "emit/"),
         ("lsp_server", "lsp/"),
         ("lsp_types", "lsp/"),
         ("clap", "cli/"),

@@ -2,11 +2,12 @@
 
 use super::designs::{NAMES, OPTIMISED, example, layout, solved, starts};
 use super::{MILLI, Report, Time, WHOLE, once};
-use flexura::equilibrium::{Model, sweep};
+use flexura::equilibrium::{Model, sweep, sweep_both_ways};
 use flexura::ir::{Design, ExportKind};
 use flexura::optimize::Problem;
 use flexura::pipeline::{Compiler, EDGES, Stages};
 use std::sync::atomic::AtomicBool;
+use std::time::Instant;
 
 fn size(design: &Design) -> String {
     format!("{} rods, {} free, {} steps", design.rods.len(), design.free.len(), design.cycle.steps)
@@ -23,6 +24,11 @@ pub fn cycles(report: &mut Report) {
                 sweep(&model).expect("equilibria").states.len()
             });
             report.row("cycle", name, &size(design), time, MILLI);
+            let time = report.time_on_two(|| {
+                let model = Model::new(design, &layout, &start, EDGES, false).expect("rods");
+                sweep_both_ways(&model).expect("equilibria").states.len()
+            });
+            report.row("cycle", &format!("{name}, two threads"), &size(design), time, MILLI);
             sum += time.least * MILLI.0;
         }
         report.set("cycle_ms", name, Some(sum));
@@ -48,21 +54,28 @@ pub fn iterations(report: &mut Report) {
 /// As `flexura build --fresh` optimises.
 pub fn optimisations(report: &mut Report) {
     for name in OPTIMISED {
-        let (mut seconds, mut iterations, mut ended) = (0.0, 0, true);
+        let (mut seconds, mut on_two, mut iterations, mut ended) = (0.0, 0.0, 0, true);
         let assembly = example(name);
         for design in &assembly.designs {
             let cancel = AtomicBool::new(false);
             let solve = || Compiler::default().optimize(design, &starts(design), &|_| (), &cancel);
             let (time, found) = once(solve);
             seconds += time;
+            on_two += report.two.install(|| {
+                let began = Instant::now();
+                let _ = std::hint::black_box(solve());
+                began.elapsed().as_secs_f64()
+            });
             let solution = found.unwrap_or_else(|e| panic!("{name}: {e:?}")).solution;
             iterations += solution.iterations;
             ended &= solution.converged;
         }
         let what = format!("{name}, {iterations} iterations{}", if ended { "" } else { " (limit)" });
-        let time = Time { least: seconds, median: seconds };
-        report.row("optimise", &what, &size(&assembly.designs[0]), time, WHOLE);
-        report.set("optimise_s", name, Some(seconds));
+        let size = size(&assembly.designs[0]);
+        for (what, s) in [(what.as_str(), seconds), (&format!("{name}, two threads"), on_two)] {
+            report.row("optimise", what, &size, Time { least: s, median: s }, WHOLE);
+        }
+        report.set("optimise_s", name, Some(on_two));
         report.set("iterations", name, Some(f64::from(u32::try_from(iterations).expect("few"))));
     }
 }
@@ -77,10 +90,13 @@ pub fn meshes(report: &mut Report) {
         let values = solved(name, &assembly);
         let compiler = Compiler::default();
         let mut bytes = 0;
-        let time = report.time(|| {
+        let mut mesh = || {
             let parts = compiler.parts(&assembly, &values).unwrap_or_else(|e| panic!("{name}: {e:?}"));
             bytes = parts.artefacts.iter().map(|p| p.bytes.len()).sum();
-        });
-        report.row("mesh", name, &format!("{:.1} MB of STL", bytes as f64 / 1e6), time, WHOLE);
+        };
+        let (one, two) = (report.time(&mut mesh), report.time_on_two(&mut mesh));
+        let size = format!("{:.1} MB of STL", bytes as f64 / 1e6);
+        report.row("mesh", name, &size, one, WHOLE);
+        report.row("mesh", &format!("{name}, two threads"), &size, two, WHOLE);
     }
 }

@@ -17,6 +17,7 @@ pub const EXPORTS: &[&str] = &[
     "stl",
     "3mf",
     "sheet",
+    "dxf",
     "glb",
     "svg",
     "png",
@@ -134,12 +135,13 @@ impl<'a> Evaluator<'a> {
                 };
                 Ok(Export { kind, origin: e.at })
             }
-            plain @ ("glb" | "3mf" | "threemf" | "sheet" | "svg" | "png" | "report") => {
+            plain @ ("glb" | "3mf" | "threemf" | "sheet" | "dxf" | "svg" | "png" | "report") => {
                 self.arguments(name, args, &[], 0)?;
                 let kind = match plain {
                     "glb" => ExportKind::Glb,
                     "3mf" | "threemf" => ExportKind::ThreeMf,
                     "sheet" => ExportKind::Sheet,
+                    "dxf" => ExportKind::Dxf,
                     "svg" => ExportKind::Svg,
                     "report" => ExportKind::Report,
                     _ => ExportKind::Png,

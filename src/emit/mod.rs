@@ -8,6 +8,7 @@ pub mod glb;
 pub mod lock;
 pub mod motion;
 mod normals;
+pub mod outlines;
 pub mod picture;
 pub mod plate;
 pub mod report;

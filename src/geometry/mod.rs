@@ -38,6 +38,7 @@ pub mod mesh;
 pub mod parts;
 pub mod ray;
 mod riser;
+mod section;
 pub mod skeleton;
 pub mod slot;
 mod space;
@@ -64,5 +65,6 @@ pub use parts::{
     build_parts, build_wanted_parts, plan_bodies,
 };
 pub use ray::Probe;
+pub use section::{Band, bands, section};
 pub use slot::{Facets, Slot};
 pub use weigh::{has_gravity, printed_volume_and_center, weigh};

@@ -681,6 +681,8 @@ pub enum ExportKind {
     Png,
     /// A drawing of the rest pose.
     Svg,
+    /// One DXF per printed part: its outlines, for what is cut from plates.
+    Dxf,
     /// A page that shows all of it.
     Report,
     /// Arduino sketch for one drive. Index into [`Design::drives`].

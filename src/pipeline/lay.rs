@@ -3,10 +3,15 @@
 use super::joined::Printed;
 use super::scene::Moving;
 use crate::diagnostic::Diagnostic;
+use crate::emit::outlines::layer_name;
 use crate::emit::plate::{Laid, Leaf, Plate};
-use crate::geometry::{FlexureSolid, Posture, lie};
-use crate::ir::Assembly;
+use crate::geometry::{Band, FlexureSolid, Posture, bands, lie};
+use crate::ir::{Assembly, Origin};
 use rayon::prelude::*;
+
+/// A plate's section half-way and those nearer to its faces differ by no more than this part of it: those of true plates agree to 1e-6, one small
+/// leaf of elliptic section in a large part makes 2e-3.
+const EVEN: f64 = 3e-4;
 
 /// Every part as it lies on its machine. `moving` is that of each design.
 pub fn plate(assembly: &Assembly, moving: &[Moving], printed: &[Printed]) -> Plate {
@@ -39,6 +44,25 @@ fn leaf(flexure: &FlexureSolid) -> Leaf {
         ends.map(|x| 2.0 * x)
     };
     Leaf { path: flexure.path.clone(), thickness_mm: range(&flexure.a_mm), width_mm: range(&flexure.b_mm) }
+}
+
+/// Parts that no cutter makes of plates: there are heights between which their section changes.
+pub fn uneven(plate: &Plate, at: Origin) -> Vec<Diagnostic> {
+    let worst = |part: &Laid| {
+        let bands = bands(&part.mesh);
+        let worst = bands.into_iter().max_by(|a, b| a.uneven.total_cmp(&b.uneven))?;
+        (worst.uneven > EVEN).then_some((part.name.clone(), worst))
+    };
+    let told = |(name, band): (String, Band)| {
+        Diagnostic::warning(
+            "W0649",
+            format!("`{name}` is not made of plates: what its DXF shows are sections"),
+            at,
+        )
+        .label(format!("in `{}` its section changes by {:.0} %", layer_name(&band), 100.0 * band.uneven))
+        .help("give its flexures a `section rect`, and lay out its joints so that all axes are upright")
+    };
+    plate.parts.iter().filter_map(worst).map(told).collect()
 }
 
 /// Parts that do not fit, and flexures that leave the layers of a process that is weak across them.

@@ -8,12 +8,14 @@ use super::stages::Parts;
 use crate::diagnostic::Diagnostic;
 use crate::emit::drawing::svg_drawing;
 use crate::emit::glb::glb_bytes;
+use crate::emit::outlines::dxf_bytes;
 use crate::emit::picture::png_bytes;
-use crate::emit::plate::Plate;
+use crate::emit::plate::{Laid, Plate};
 use crate::emit::scene::Scene;
 use crate::emit::sheet::print_sheet;
 use crate::emit::stl::stl_bytes;
 use crate::emit::threemf::threemf_bytes;
+use crate::geometry::bands;
 use crate::ir::{Assembly, ExportKind};
 use std::cell::OnceCell;
 
@@ -76,6 +78,9 @@ pub fn artefacts(built: &Built<'_>) -> Parts {
     let shown = reported.then(|| (scene().clone(), plate().clone()));
     if let Some(plate) = laid.get() {
         found.extend(lay::findings(assembly, plate, printed));
+        if let Some(cut) = assembly.exports.iter().find(|e| e.export.kind == ExportKind::Dxf) {
+            found.extend(lay::uneven(plate, cut.export.origin));
+        }
     }
     Parts { artefacts: out, diagnostics: found, shown }
 }
@@ -109,6 +114,13 @@ fn files<'s>(
         ExportKind::Sheet => {
             let bytes = Ok(print_sheet(plate()).into_bytes());
             vec![file(format!("{name}.print.md"), bytes, "E0646", "print sheet")]
+        }
+        ExportKind::Dxf => {
+            let drawn = |p: &Laid| {
+                let bytes = dxf_bytes(&bands(&p.mesh));
+                file(format!("{}.dxf", p.name), bytes, "E0647", "DXF")
+            };
+            plate().parts.iter().map(drawn).collect()
         }
         ExportKind::Png => vec![file(format!("{name}.png"), picture(PICTURE), "E0647", "picture")],
         ExportKind::Svg => {

@@ -171,6 +171,7 @@ pub fn cases() -> Vec<(&'static str, Find)> {
         ("E0641", lazy(|| at_start(&apart(0.0, "sharing base")))),
         ("W0642", lazy(|| at_start(&apart(4.7, "sharing base")))),
         ("W0644", lazy(|| at_start(WRIST))),
+        ("W0649", lazy(|| at_start(&WRIST.replace("export stl", "export dxf")))),
         (
             "W0645",
             lazy(|| {
