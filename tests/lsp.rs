@@ -7,13 +7,14 @@ mod common;
 use common::skipped;
 use flexura::elaborate::{FileError, std_source};
 use flexura::lsp::server::{Connection, serve};
-use flexura::lsp::{Host, complete, edits, outline, signature, space};
+use flexura::lsp::{Host, Work, apply, complete, edits, outline, signature, space};
 use flexura::syntax::starting_words;
 use flexura::syntax::tree::Kind;
 use lsp_server::{Message, Notification, Request, RequestId};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -29,6 +30,9 @@ impl Host for Memory {
     }
     fn library(&self, module: &str) -> Option<String> {
         std_source(module).map(|_| format!("/std/{module}"))
+    }
+    fn start(&self, _: &str, _: &[String], _: String) -> Result<Arc<dyn Work>, String> {
+        Err("nothing is solved here".into())
     }
 }
 
