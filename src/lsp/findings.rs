@@ -3,7 +3,7 @@
 //! and what was found of older texts is dropped.
 
 use super::server::{Below, Fault, Texts, split};
-use super::shown::shown;
+use super::shown::Shown;
 use super::{Work, solver, uri};
 use crate::diagnostic::{Diagnostic, SourceMap};
 use crate::elaborate::{Options, elaborate};
@@ -227,8 +227,11 @@ pub(super) fn checked(texts: &Texts, path: &str) -> Found {
 fn as_shown(path: &str, found: &Found) -> Vec<lsp_types::Diagnostic> {
     let (folder, _) = split(path);
     // A file of parts is no design, and need not be one.
-    let text = found.sources.files.first().map_or("", |f| f.text.as_str());
-    let parts = !crate::syntax::parse(0, text).file.items.is_empty();
-    let told = found.diagnostics.iter().filter(|d| !(parts && d.code == "E0401"));
-    told.map(|d| shown(d, folder, &found.sources)).collect()
+    let parts = || {
+        let text = found.sources.files.first().map_or("", |f| f.text.as_str());
+        !crate::syntax::parse(0, text).file.items.is_empty()
+    };
+    let told = found.diagnostics.iter().filter(|d| d.code != "E0401" || !parts());
+    let mut shown = Shown::new(folder, &found.sources);
+    told.map(|d| shown.of(d)).collect()
 }

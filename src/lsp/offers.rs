@@ -5,7 +5,7 @@ use super::changes::workspace_edit;
 use super::names::What;
 use super::requests::Here;
 use super::server::Below;
-use super::shown::shown;
+use super::shown::Shown;
 use super::solver::lock_name;
 use super::{apply, commands, uri};
 use crate::syntax::tree::{Kind, Node};
@@ -41,12 +41,13 @@ impl Here<'_> {
         let found = known.unwrap_or_else(|| self.view.found.clone());
         let mut all = Vec::new();
         if wanted(QUICK) {
+            let mut places = Shown::new(&self.view.folder, &found.sources);
             for d in &found.diagnostics {
                 let mut fixes = repairs(d, &found.sources).into_iter().peekable();
                 if fixes.peek().is_none() {
                     continue;
                 }
-                let shown = shown(d, &self.view.folder, &found.sources);
+                let shown = places.of(d);
                 if shown.range.end < range.start || range.end < shown.range.start {
                     continue;
                 }
