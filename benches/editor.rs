@@ -1,7 +1,7 @@
 //! How long an editor waits for findings after a keystroke, as Markdown: a record of typing, deleting, pasting and taking
 //! back over a whole design and over one of a thousand lines; and what the server's memory does meanwhile.
 //!
-//! `cargo bench --bench editor [-- --keys N]`.
+//! `cargo bench --bench editor [-- --keys N --limit MS]`: beyond the limit for the 95th percentile of the first it fails.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 #[path = "../tests/common/keys.rs"]
@@ -52,7 +52,8 @@ fn resident_mb() -> Option<f64> {
     line.split_whitespace().next()?.parse::<f64>().ok().map(|kb| kb / 1024.0)
 }
 
-fn replay(name: &str, text: &str, wanted: usize) {
+/// Plays a record; the 95th percentile, ms.
+fn replay(name: &str, text: &str, wanted: usize) -> f64 {
     let (server, editor) = Connection::memory();
     let server = std::thread::spawn(move || serve(server, Box::new(Nothing)).unwrap());
     let ask = |method: &str, params: Value| {
@@ -110,16 +111,18 @@ fn replay(name: &str, text: &str, wanted: usize) {
     ask("shutdown", Value::Null);
     tell("exit", Value::Null);
     server.join().unwrap();
+    at(0.95)
 }
 
 fn main() {
-    let mut wanted = 10_000;
+    let (mut wanted, mut limit_ms) = (10_000, f64::INFINITY);
     // cargo itself adds `--bench`.
     let mut rest = std::env::args().skip(1).filter(|a| a != "--bench");
     while let Some(name) = rest.next() {
         match (name.as_str(), rest.next()) {
             ("--keys", Some(n)) => wanted = n.parse().expect("a number of keys"),
-            _ => panic!("there is no {name}: --keys N"),
+            ("--limit", Some(ms)) => limit_ms = ms.parse().expect("milliseconds"),
+            _ => panic!("there is no {name}: --keys N, --limit MS"),
         }
     }
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/jansen/jansen.mech");
@@ -128,6 +131,7 @@ fn main() {
         "| design | lines | keys | median, ms | 95th percentile, ms | most, ms | memory after a tenth and at the end, MB |"
     );
     println!("| --- | --- | --- | --- | --- | --- | --- |");
-    replay("jansen.mech", &text, wanted);
+    let waited_ms = replay("jansen.mech", &text, wanted);
     replay("seven times jansen.mech", &thousand(&text), wanted);
+    assert!(waited_ms < limit_ms, "findings take {waited_ms:.1} ms, more than {limit_ms} ms");
 }

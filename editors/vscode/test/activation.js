@@ -72,6 +72,12 @@ class Disposable {
   constructor(dispose) { this.dispose = dispose; }
   static from(...all) { return new Disposable(() => all.forEach((one) => one.dispose())); }
 }
+class CodeActionKind {
+  constructor(value) { this.value = value; }
+  append(part) { return new CodeActionKind(this.value ? `${this.value}.${part}` : part); }
+}
+for (const [name, value] of [["Empty", ""], ["QuickFix", "quickfix"], ["Refactor", "refactor"], ["RefactorExtract", "refactor.extract"], ["RefactorInline", "refactor.inline"], ["RefactorRewrite", "refactor.rewrite"], ["Source", "source"], ["SourceOrganizeImports", "source.organizeImports"]])
+  CodeActionKind[name] = new CodeActionKind(value);
 // What is only made and handed on: classes that keep what they are given.
 const plain = (name) => ({ [name]: class { constructor(...given) { this.given = given; } } })[name];
 const lenient = (own, missing) =>
@@ -92,7 +98,7 @@ const say = async (message) => void shown.push(message);
 const events = (name) => (name.startsWith("on") ? new EventEmitter().event : undefined);
 const vscode = lenient(
   {
-    version: "1.90.0", EventEmitter, Uri, CancellationTokenSource, Disposable,
+    version: "1.90.0", CodeActionKind, EventEmitter, Uri, CancellationTokenSource, Disposable,
     CancellationError: class extends Error {},
     env: { language: "en", appName: "stand-in", openExternal: async (uri) => opened.push(uri.toString()) > 0 },
     commands: {
