@@ -1,6 +1,7 @@
 //! One function a command: files to a request, the pipeline, its outcome to files and reports.
 
 use super::artefacts::{Output, WriteError, write_atomic, write_below};
+use super::events::Events;
 use super::interrupt;
 use super::manners::Manners;
 use super::progress::Terminal;
@@ -10,7 +11,7 @@ use super::style::Style;
 use super::{Build, Common, Format, Simulate, human, render};
 use flexura::diagnostic::{Severity, SourceMap};
 use flexura::emit::csv::{MotionTable, columns, values, write_csv};
-use flexura::pipeline::{self, BuildOutcome, Compiler, FileError, Request, Show, placeless};
+use flexura::pipeline::{self, BuildOutcome, Compiler, FileError, Progress, Request, Show, placeless};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -97,6 +98,13 @@ fn motion_json(out: &BuildOutcome, table: Option<&MotionTable>) -> serde_json::V
 /// `flexura build`.
 pub fn build(arguments: &Build) -> u8 {
     let format = arguments.common.format;
+    if arguments.events {
+        let events = Events::new();
+        let built =
+            build_one(arguments, arguments.common.variant.as_deref(), &events, &AtomicBool::new(false));
+        events.outcome(&built.0, &built.1);
+        return finish_build(&built.0, format, &built.1);
+    }
     let progress = Terminal::new(format == Format::Human && !Manners::chosen().quiet);
     let cancel = interrupt::during(progress.on_stop());
     let mut builds = vec![build_one(arguments, arguments.common.variant.as_deref(), &progress, &cancel)];
@@ -120,7 +128,12 @@ pub fn build(arguments: &Build) -> u8 {
 type Built = (BuildOutcome, Vec<(String, usize)>);
 
 /// Builds the design as it stands, or a variant of it, into its folder; also what was written.
-fn build_one(arguments: &Build, variant: Option<&str>, progress: &Terminal, cancel: &AtomicBool) -> Built {
+fn build_one(
+    arguments: &Build,
+    variant: Option<&str>,
+    progress: &dyn Progress,
+    cancel: &AtomicBool,
+) -> Built {
     let common = &Common { variant: variant.map(String::from), ..arguments.common.clone() };
     let folder = variant.map_or(arguments.out.clone(), |variant| arguments.out.join(variant));
     let mut opened = match open(common) {

@@ -8,6 +8,7 @@ mod config;
 mod coupon;
 mod diff;
 mod doc;
+mod events;
 mod explain;
 mod fmt;
 mod git;
@@ -180,6 +181,9 @@ struct Build {
     /// Which optimiser; all keep the bounds
     #[arg(long, value_enum, default_value_t = Optimizer::Lm)]
     optimizer: Optimizer,
+    /// Tell an editor what goes on: lines of JSON on the standard error
+    #[arg(long, hide = true)]
+    events: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -31,3 +31,19 @@ pub fn difference(old: &str, new: &str) -> Vec<(Range<usize>, String)> {
     }
     edits
 }
+
+/// What of one text has to be replaced to have the other: without what both begin and end with; none where they agree.
+pub fn smallest(old: &str, new: &str) -> Option<(Range<usize>, String)> {
+    if old == new {
+        return None;
+    }
+    let same = |(a, b): &(char, char)| a == b;
+    let length = |pairs: &mut dyn Iterator<Item = (char, char)>| -> usize {
+        pairs.take_while(same).map(|(c, _)| c.len_utf8()).sum()
+    };
+    let start = length(&mut old.chars().zip(new.chars()));
+    let (rest, with) = (old.get(start..)?, new.get(start..)?);
+    let end = length(&mut rest.chars().rev().zip(with.chars().rev()));
+    let text = with.get(..with.len() - end)?;
+    Some((start..old.len() - end, text.into()))
+}

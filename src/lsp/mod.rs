@@ -1,19 +1,28 @@
 //! The language server: what an editor asks of a design, answered from its tree.
 //!
 //! Every answer is a pure function of texts and a place (`hover`, `complete`, `names`, …) in bytes; `server` alone knows
-//! the protocol, and `text` alone counts in UTF-16. Files and folders come in through [`Host`].
+//! the protocol, and `text` alone counts in UTF-16. Files, folders and processes come in through [`Host`]: what takes
+//! seconds is done by the command itself, beside the server.
 
+mod actions;
 pub mod answers;
+pub mod apply;
+mod changes;
+mod commands;
 pub mod complete;
 pub mod edits;
 mod findings;
 pub mod hints;
 pub mod hover;
 pub mod names;
+mod offers;
 pub mod outline;
 mod requests;
+mod running;
 pub mod server;
+mod shown;
 pub mod signature;
+mod solver;
 pub mod space;
 pub mod text;
 pub mod tokens;
@@ -21,6 +30,10 @@ mod uri;
 mod vocabulary;
 
 use crate::elaborate::FileError;
+use crate::lint::Levels;
+pub use running::Event;
+pub use solver::solve;
+use std::sync::Arc;
 
 /// The world outside of the server: disk and folders.
 pub trait Host: Send + Sync {
@@ -35,4 +48,25 @@ pub trait Host: Send + Sync {
 
     /// Where an editor can read a file of the standard library, such as `materials/rigur.mech`.
     fn library(&self, module: &str) -> Option<String>;
+
+    /// Which findings of the designs in a folder are told, and how loudly.
+    fn levels(&self, _folder: &str) -> Levels {
+        Levels::default()
+    }
+
+    /// Starts `flexura ARGUMENTS` in a folder, with `input` on its standard input.
+    ///
+    /// # Errors
+    /// Why it could not be started.
+    fn start(&self, folder: &str, arguments: &[String], input: String) -> Result<Arc<dyn Work>, String>;
+}
+
+/// A command at work.
+pub trait Work: Send + Sync {
+    /// Ends it at once. It writes whole files or none, so nothing is left half done.
+    fn stop(&self);
+
+    /// Waits for its end, giving each line of its standard error to `told`; then its standard output, or none where it
+    /// was stopped.
+    fn wait(&self, told: &mut dyn FnMut(&str)) -> Option<String>;
 }

@@ -3,7 +3,7 @@
 use super::server::{Server, View};
 use super::space::{Place, Space};
 use super::text::Lines;
-use super::{complete, edits, hints, hover, outline, signature, tokens, uri};
+use super::{commands, complete, edits, hints, hover, offers, outline, signature, tokens, uri};
 use lsp_server::ErrorCode;
 use lsp_types::*;
 use serde_json::Value;
@@ -42,6 +42,15 @@ pub(super) fn capabilities() -> ServerCapabilities {
         document_symbol_provider: Some(OneOf::Left(true)),
         folding_range_provider: Some(FoldingRangeProviderCapability::Simple(true)),
         document_formatting_provider: Some(OneOf::Left(true)),
+        code_action_provider: Some(CodeActionProviderCapability::Options(CodeActionOptions {
+            code_action_kinds: Some(offers::KINDS.map(CodeActionKind::from).to_vec()),
+            ..Default::default()
+        })),
+        code_lens_provider: Some(CodeLensOptions { resolve_provider: Some(false) }),
+        execute_command_provider: Some(ExecuteCommandOptions {
+            commands: commands::ALL.map(|(command, _)| command.to_string()).to_vec(),
+            work_done_progress_options: WorkDoneProgressOptions { work_done_progress: Some(true) },
+        }),
         inlay_hint_provider: Some(OneOf::Left(true)),
         semantic_tokens_provider: Some(
             SemanticTokensOptions {
@@ -83,6 +92,10 @@ pub(super) fn answer(server: &mut Server, method: &str, params: Value) -> Answer
         "textDocument/formatting" => value(here.formatting()),
         "textDocument/inlayHint" => value(here.hints(params.range)),
         "textDocument/semanticTokens/full" => value(here.tokens()),
+        "textDocument/codeAction" => {
+            value(here.actions(params.range.unwrap_or_default(), params.context.and_then(|c| c.only)))
+        }
+        "textDocument/codeLens" => value(here.lenses()),
         other => Err((ErrorCode::MethodNotFound, format!("`{other}` is not offered"))),
     }
 }
@@ -103,6 +116,7 @@ struct Params {
 struct Context {
     #[serde(default = "yes")]
     include_declaration: bool,
+    only: Option<Vec<String>>,
 }
 
 fn yes() -> bool {
@@ -114,19 +128,19 @@ fn value<T: serde::Serialize>(answer: T) -> Answer {
 }
 
 impl View {
-    fn text(&self) -> &str {
+    pub(super) fn text(&self) -> &str {
         self.space.files.get(&self.file).map_or("", |t| t.text.as_str())
     }
 }
 
-struct Here<'a> {
-    server: &'a Server,
-    view: Arc<View>,
+pub(super) struct Here<'a> {
+    pub server: &'a Server,
+    pub view: Arc<View>,
     byte: usize,
 }
 
 impl Here<'_> {
-    fn range(&self, bytes: &Bytes<usize>) -> Range {
+    pub(super) fn range(&self, bytes: &Bytes<usize>) -> Range {
         self.view.lines.range(self.view.text(), bytes)
     }
 

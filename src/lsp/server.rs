@@ -1,24 +1,27 @@
 //! The protocol: messages in, answers out. Keeps the texts as the editor has them and asks the pure functions beside it.
 //!
-//! The loop only ever does what takes milliseconds: findings are worked out by one thread beside it, which always takes
-//! the newest texts and drops what became of older ones. Of what came in together, a request about a text that has moved
+//! The loop only ever does what takes milliseconds: findings are worked out by threads beside it, which always take the
+//! newest texts and drop what became of older ones, and commands by processes. Of what came in together, a request about a text that has moved
 //! on since is answered by "content modified", and one that was cancelled is not worked on.
 
 use super::answers::Evaluated;
-use super::findings::{self, Findings};
+use super::findings::{self, Findings, Found, Out};
+use super::running::{Client, Running};
 use super::space::Space;
 use super::text::{Lines, change};
-use super::{Host, requests, uri};
+use super::{Host, commands, requests, uri};
 use crate::elaborate::{FileError, Files};
 pub use lsp_server::Connection;
 use lsp_server::{ErrorCode, Message, Notification, Request, RequestId, Response};
 use lsp_types as lsp;
 use lsp_types::notification::{
     Cancel, DidChangeTextDocument, DidCloseTextDocument, DidOpenTextDocument, DidSaveTextDocument,
-    Notification as _,
+    Notification as _, WorkDoneProgressCancel,
 };
+use lsp_types::request::{ExecuteCommand, Request as _};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Why serving ended.
 pub type Fault = Box<dyn std::error::Error + Send + Sync>;
@@ -58,15 +61,34 @@ pub(super) struct View {
     pub file: String,
     pub space: Space,
     pub known: Evaluated,
+    /// What the text alone tells.
+    pub found: Arc<Found>,
+    /// What is built of it; none where there are errors.
+    pub built: Option<Built>,
     pub lines: Lines,
+}
+
+/// What a file builds.
+pub(super) struct Built {
+    /// The mechanism.
+    pub name: String,
+    /// It makes a report.
+    pub report: bool,
 }
 
 pub(super) struct Server {
     pub texts: Texts,
-    versions: BTreeMap<String, i32>,
+    pub versions: BTreeMap<String, i32>,
+    /// The file that was opened, changed or saved last.
+    pub touched: Option<String>,
     /// The views of the texts as they are now.
     views: BTreeMap<String, Arc<View>>,
-    findings: Findings,
+    pub findings: Arc<Findings>,
+    pub running: Arc<Running>,
+    pub client: Client,
+    pub out: Out,
+    /// A command has written a lock: what the views show of it is old.
+    pub lock_changed: Arc<AtomicBool>,
 }
 
 /// Serves one editor until it says goodbye.
@@ -74,16 +96,31 @@ pub(super) struct Server {
 /// # Errors
 /// Where the editor does not keep to the protocol or goes away.
 pub fn serve(connection: Connection, host: Box<dyn Host>) -> Result<(), Fault> {
-    connection.initialize(serde_json::to_value(requests::capabilities())?)?;
+    let params = connection.initialize(serde_json::to_value(requests::capabilities())?)?;
     let texts = Texts { open: BTreeMap::new(), host: Arc::from(host) };
     let sender = connection.sender.clone();
-    let (findings, worker) = findings::start(Box::new(move |message| drop(sender.send(message))))?;
-    let mut server = Server { texts, versions: BTreeMap::new(), views: BTreeMap::new(), findings };
+    let out: Out = Arc::new(move |message| drop(sender.send(message)));
+    let (findings, workers) = findings::start(Arc::clone(&out))?;
+    let mut server = Server {
+        texts,
+        versions: BTreeMap::new(),
+        touched: None,
+        views: BTreeMap::new(),
+        findings,
+        running: Arc::default(),
+        client: Client::of(&params),
+        out,
+        lock_changed: Arc::default(),
+    };
     let served = server.run(&connection);
-    // The worker ends when nobody can ask it any more.
+    server.running.cancel_all();
+    server.findings.board.stop();
+    // The workers end when nobody can ask them any more.
     drop(server);
     drop(connection);
-    let _ = worker.join();
+    for worker in workers {
+        let _ = worker.join();
+    }
     served
 }
 
@@ -99,10 +136,12 @@ impl Server {
                             return Ok(());
                         }
                         let response = match outdated.get(&request.id) {
-                            Some(code) => refusal(request.id, *code),
+                            Some(code) => Some(refusal(request.id, *code)),
                             None => self.answer(request),
                         };
-                        connection.sender.send(response.into())?;
+                        if let Some(response) = response {
+                            connection.sender.send(response.into())?;
+                        }
                     }
                     Message::Notification(note) => self.note(note),
                     Message::Response(_) => {}
@@ -112,12 +151,16 @@ impl Server {
         Ok(())
     }
 
-    fn answer(&mut self, request: Request) -> Response {
+    /// The answer, unless it comes later.
+    fn answer(&mut self, request: Request) -> Option<Response> {
         let id = request.id.clone();
-        match requests::answer(self, &request.method, request.params) {
+        if request.method == ExecuteCommand::METHOD {
+            return commands::execute(self, id, request.params);
+        }
+        Some(match requests::answer(self, &request.method, request.params) {
             Ok(value) => Response::new_ok(id, value),
             Err((code, why)) => Response::new_err(id, code as i32, why),
-        }
+        })
     }
 
     fn note(&mut self, note: Notification) {
@@ -125,7 +168,9 @@ impl Server {
             DidOpenTextDocument::METHOD => {
                 if let Ok(p) = serde_json::from_value::<lsp::DidOpenTextDocumentParams>(note.params) {
                     let document = p.text_document;
-                    self.set(uri::path(&document.uri), document.version, document.text);
+                    let path = uri::path(&document.uri);
+                    self.set(path.clone(), document.version, document.text);
+                    self.look(Some(path));
                 }
             }
             DidChangeTextDocument::METHOD => {
@@ -134,6 +179,7 @@ impl Server {
                     let mut text = self.texts.open.get(&path).map(|t| t.to_string()).unwrap_or_default();
                     change(&mut text, p.content_changes);
                     self.set(path, p.text_document.version, text);
+                    self.look(None);
                 }
             }
             DidCloseTextDocument::METHOD => {
@@ -142,13 +188,28 @@ impl Server {
                     self.texts.open.remove(&path);
                     self.versions.remove(&path);
                     self.views.clear();
-                    self.look();
+                    self.look(None);
                 }
             }
             DidSaveTextDocument::METHOD => {
-                // The lock or a file that is not open may have changed with it.
-                self.views.clear();
-                self.look();
+                if let Ok(p) = serde_json::from_value::<lsp::DidSaveTextDocumentParams>(note.params) {
+                    // The lock or a file that is not open may have changed with it.
+                    let path = uri::path(&p.text_document.uri);
+                    self.touched = Some(path.clone());
+                    self.views.clear();
+                    self.look(Some(path));
+                }
+            }
+            Cancel::METHOD => {
+                let id = note.params.get("id").cloned();
+                if let Some(id) = id.and_then(|id| serde_json::from_value(id).ok()) {
+                    self.running.cancel(&id);
+                }
+            }
+            WorkDoneProgressCancel::METHOD => {
+                if let Ok(p) = serde_json::from_value::<lsp::WorkDoneProgressCancelParams>(note.params) {
+                    self.running.cancel_token(&p.token);
+                }
             }
             _ => {}
         }
@@ -156,18 +217,21 @@ impl Server {
 
     fn set(&mut self, path: String, version: i32, text: String) {
         self.texts.open.insert(path.clone(), text.into());
-        self.versions.insert(path, version);
+        self.versions.insert(path.clone(), version);
+        self.touched = Some(path);
         self.views.clear();
-        self.look();
     }
 
     /// Has all open texts looked at: any may import the one that changed.
-    fn look(&mut self) {
-        self.findings.look(self.texts.clone(), self.versions.clone());
+    fn look(&mut self, settled: Option<String>) {
+        self.findings.look(self.texts.clone(), self.versions.clone(), settled);
     }
 
     /// What is known of a file; worked out once for each state of the texts.
     pub(super) fn view(&mut self, path: &str) -> Arc<View> {
+        if self.lock_changed.swap(false, Ordering::SeqCst) {
+            self.views.clear();
+        }
         if let Some(view) = self.views.get(path) {
             return Arc::clone(view);
         }
@@ -175,9 +239,15 @@ impl Server {
         let files = Below { folder, texts: &self.texts };
         let space = Space::read(file, &files);
         let lock = self.texts.host.read(folder, &format!("{}.lock", file.trim_end_matches(".mech"))).ok();
-        let (known, _) = Evaluated::of(file, &files, lock.as_deref());
+        let (known, out) = Evaluated::of(file, &files, lock.as_deref());
+        let found = Arc::new(Found { diagnostics: out.diagnostics, sources: out.sources });
+        let built = out.assembly.map(|a| {
+            let report = a.exports.iter().any(|e| e.export.kind == crate::ir::ExportKind::Report);
+            Built { name: a.name, report }
+        });
         let lines = Lines::of(space.files.get(file).map_or("", |t| t.text.as_str()));
-        let view = Arc::new(View { folder: folder.into(), file: file.into(), space, known, lines });
+        let view =
+            Arc::new(View { folder: folder.into(), file: file.into(), space, known, found, built, lines });
         self.views.insert(path.into(), Arc::clone(&view));
         view
     }

@@ -18,3 +18,33 @@ end
 if vim.lsp.inlay_hint and vim.lsp.inlay_hint.enable then
   pcall(vim.lsp.inlay_hint.enable, true, { bufnr = buffer })
 end
+
+-- Colours and folds of the tree-sitter grammar, where it is installed (editors/tree-sitter-flexura/install.sh neovim).
+if vim.treesitter.language and vim.treesitter.language.register then
+  pcall(vim.treesitter.language.register, "flexura", "mech")
+end
+if vim.treesitter.start and pcall(vim.treesitter.start, buffer, "flexura") then
+  vim.wo.foldmethod = "expr"
+  vim.wo.foldexpr = vim.treesitter.foldexpr and "v:lua.vim.treesitter.foldexpr()" or ""
+  vim.wo.foldlevel = 99
+end
+
+-- :FlexuraBuild, :FlexuraSimulate, ... : the commands of the server, on this file.
+local commands = {
+  Build = "build",
+  Simulate = "simulate",
+  ShowReport = "showReport",
+  ApplyOptimised = "applyOptimised",
+  BetterRest = "betterRest",
+}
+for name, command in pairs(commands) do
+  vim.api.nvim_buf_create_user_command(buffer, "Flexura" .. name, function()
+    if command == "build" or command == "showReport" then vim.cmd("silent update") end
+    vim.lsp.buf_request(buffer, "workspace/executeCommand", {
+      command = "flexura." .. command,
+      arguments = { vim.uri_from_bufnr(buffer) },
+    }, function(why, answer)
+      if why then vim.notify("flexura: " .. why.message, vim.log.levels.ERROR) end
+    end)
+  end, { desc = "Flexura: " .. name })
+end

@@ -1,0 +1,3 @@
+[
+  (mechanism) (flexure) (record) (minimize) (rod) (variant) (for) (case) (keys) (overrides) (tuple)
+] @fold

@@ -1,0 +1,5 @@
+[
+  (block) (fields) (overrides) (minimize) (rod) (variant) (keys) (tuple) (call)
+] @indent
+
+["}" ")"] @outdent
