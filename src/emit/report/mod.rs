@@ -1,12 +1,15 @@
 //! The report: one HTML file that needs nothing else, to look at a solved design and to move it. Plain data in, one page
 //! out; the same data give the same bytes. Numbers come with their units, as they are to be read.
 
+pub mod live;
 mod pack;
 mod plot;
 mod text;
+mod way;
 mod wiring;
 
 pub use plot::{Plot, Series};
+pub use way::Way;
 pub use wiring::{Motor, Wiring};
 
 use super::drawing::svg_drawing;
@@ -33,6 +36,8 @@ pub struct Report<'a> {
     pub checks: Vec<Check>,
     /// Quantities over the cycle.
     pub plots: Vec<Plot>,
+    /// Parameters that are not free.
+    pub parameters: Vec<Fixed>,
     /// How each design was solved.
     pub solved: Vec<Solved>,
     /// Findings, as their levels have them.
@@ -86,8 +91,21 @@ pub struct Solved {
     pub converged: bool,
     /// Terms of the objective: name, at the start, at the end.
     pub terms: Vec<(String, f64, f64)>,
+    /// The terms on the way there, where that is known.
+    pub way: Option<Way>,
     /// Its free variables.
     pub variables: Vec<Variable>,
+}
+
+/// A parameter that stays as it is written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fixed {
+    /// As `--set` names it.
+    pub path: String,
+    /// Value and unit.
+    pub text: String,
+    /// What the text says of it.
+    pub doc: String,
 }
 
 /// A free variable with its bounds.
@@ -247,6 +265,7 @@ struct Page<'r> {
     machines: Vec<(String, Vec<(&'static str, String)>)>,
     data: String,
     blob: String,
+    policy: &'static str,
     style: &'static str,
     script: &'static str,
     three: &'static str,
@@ -298,9 +317,10 @@ pub fn report_html(report: &Report<'_>) -> Result<Vec<u8>, String> {
         machines: sheet::machines(report.plate),
         data,
         blob,
+        policy: live::POLICY,
         style: include_str!("page/report.css"),
-        script: include_str!("page/report.js"),
-        three: include_str!("three/three.min.js"),
+        script: live::SCRIPT,
+        three: live::THREE,
     };
     page.render().map(String::into_bytes).map_err(|e| e.to_string())
 }
