@@ -30,7 +30,7 @@ pub use examine::{Examined, Extent, Values, examine};
 pub use history::History;
 pub use manifest::COMPILER;
 pub use measure::{aggregate, check_requirements, is_closed, measure};
-pub use parameters::Parameter;
+pub use parameters::{Parameter, of as parameters};
 pub use progress::{Iteration, Progress, Stage};
 pub use report::{
     Artefact, BuildOutcome, DriveMeasures, GapMeasures, Kept, Measures, Origin, Place, RequirementResult,
