@@ -32,11 +32,11 @@ pub fn of(checked: &Checked) -> Vec<Parameter> {
         items.filter_map(|i| if let Item::Mechanism(m) = i { Some(m) } else { None })
     };
     let mut out = Vec::new();
-    for m in mechanisms().filter(|m| m.at == assembly.origin) {
+    for m in mechanisms().filter(|m| m.name.at == assembly.origin) {
         take(checked, m, "", &mut out);
     }
-    for m in mechanisms().filter(|m| m.at != assembly.origin) {
-        if assembly.designs.iter().any(|d| d.origin == m.at) {
+    for m in mechanisms().filter(|m| m.name.at != assembly.origin) {
+        if assembly.designs.iter().any(|d| d.origin == m.name.at) {
             take(checked, m, &format!("{}.", m.name.node), &mut out);
         }
     }

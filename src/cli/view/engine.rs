@@ -106,9 +106,10 @@ impl Engine {
         self.changed.notify_all();
     }
 
-    /// The page, if there is one.
-    pub fn page(&self) -> Option<Arc<String>> {
-        self.inner().page.clone()
+    /// The page, if there is one, and its number.
+    pub fn page(&self) -> (u64, Option<Arc<String>>) {
+        let inner = self.inner();
+        (inner.told.version, inner.page.clone())
     }
 
     /// What goes on as JSON with its number, as soon as that is not `after`; none when nothing has changed for so long,

@@ -119,11 +119,12 @@ impl Service {
     }
 
     fn page(&self) -> String {
+        let (version, page) = self.engine.page();
         let head = format!(
-            "<meta name=\"flexura-token\" content=\"{}\">\n<link rel=\"stylesheet\" href=\"/live.css\">",
+            "<meta name=\"flexura-token\" content=\"{}\">\n<meta name=\"flexura-version\" content=\"{version}\">\n<link rel=\"stylesheet\" href=\"/live.css\">",
             self.token
         );
-        match self.engine.page() {
+        match page {
             Some(page) => {
                 let bench = include_str!("page/bench.html").to_string();
                 let scripts = ["/three.js", "/report.js", "/live.js"].map(String::from);

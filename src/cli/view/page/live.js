@@ -34,12 +34,12 @@ async function set(name, value) {
 }
 
 // ---- newer pages -----------------------------------------------------------------------------------
-let shown = null, wanted = null, fetching = false;
+let shown = Number(document.querySelector('meta[name="flexura-version"]').content), wanted = shown, fetching = false;
+root.dataset.version = String(shown);
 async function renew() {
-    if (fetching || wanted === shown) return;
+    if (fetching || wanted <= shown) return;
     fetching = true;
-    while (wanted !== shown) {
-        const version = wanted;
+    while (wanted > shown) {
         try {
             const answer = await fetch("/", { cache: "no-store" });
             if (!answer.ok) break;
@@ -48,8 +48,9 @@ async function renew() {
             if (!byId("stage")) return location.reload();
             await flexura.ready;
             await flexura.swap(text);
-            shown = version;
-            root.dataset.version = String(version);
+            const version = new DOMParser().parseFromString(text.slice(0, 4000), "text/html").querySelector('meta[name="flexura-version"]');
+            shown = Number(version.content);
+            root.dataset.version = String(shown);
         } catch (why) {
             console.warn(String(why));
             break;
@@ -197,11 +198,6 @@ function follow(state) {
     }
     root.dataset.phase = state.phase;
     wanted = state.version;
-    // The page itself is the newest one when it is opened.
-    if (shown === null && (bench || wanted === 0)) {
-        shown = wanted;
-        root.dataset.version = String(wanted);
-    }
     renew();
 }
 
