@@ -83,7 +83,7 @@ const version = (page) => page.evaluate(() => Number(document.documentElement.da
 const newer = (page, than) => until(page, "a newer page", (v) => Number(document.documentElement.dataset.version) > v, than);
 const look = (page) => page.evaluate(() => globalThis.flexura.look());
 /** Where the first trace leads: what the page shows of the motion. */
-const trace = (page) => page.evaluate(() => JSON.parse(document.getElementById("data").textContent).traces.map((t) => t.path.slice(2).join()).join(";") + JSON.parse(document.getElementById("data").textContent).box.join());
+const trace = (page) => page.evaluate(() => JSON.parse(document.getElementById("data").textContent).traces.map((t) => t.path.slice(2).join()).join(";"));
 
 let page = await open({ width: 1360, height: 900, dark: false });
 console.log(`${basename(design)} at ${address}`);

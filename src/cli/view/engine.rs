@@ -18,6 +18,7 @@ use flexura::pipeline::{
     placeless,
 };
 use std::collections::{BTreeMap, VecDeque};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -210,6 +211,8 @@ impl Engine {
             inner.taken = inner.wanted;
             inner.cancel = Arc::default();
             inner.solids = None;
+            // Its curve is of other parameters or another text.
+            inner.told.solving = None;
             let wish = Wish {
                 number: inner.wanted,
                 set: inner.set.clone(),
@@ -218,7 +221,12 @@ impl Engine {
             };
             drop(inner);
             self.phase("reading");
-            self.grant(&wish);
+            // Whatever happens to one text, the next one is looked at.
+            if catch_unwind(AssertUnwindSafe(|| self.grant(&wish))).is_err() {
+                let message = "the compiler has met a fault of its own with this text; please report it";
+                let fault = placeless(Severity::Error, "E0757", message);
+                self.fault(&wish, &[fault], &SourceMap::default());
+            }
         }
     }
 
@@ -464,11 +472,13 @@ impl Engine {
             let all = Shown { compiler, whole: true };
             let cancel = AtomicBool::new(false);
             let run = || pipeline::build_upon(&job.request, &NothingMade, &all, &*job.files, &Quiet, &cancel);
-            let mut out = match &pool {
+            let made = catch_unwind(AssertUnwindSafe(|| match &pool {
                 Some(pool) => pool.install(run),
                 None => run(),
-            };
-            self.publish(job.wish, &mut out, true);
+            }));
+            if let Ok(mut out) = made {
+                self.publish(job.wish, &mut out, true);
+            }
             self.tell(|inner| {
                 if inner.wanted == job.wish {
                     inner.told.phase = "";

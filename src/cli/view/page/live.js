@@ -76,6 +76,7 @@ function say(state) {
         text = last ? `Optimising${of}: iteration ${last.n}, cost ${number(last.cost)}` : `Optimising${of} …`;
         if (last && last.n > 0 && first.cost > 0) text += ` (at the start ${number(first.cost)}, best ${number(solving.best)})`;
         if (last && last.error_mm !== null) text += `, largest error ${number(last.error_mm)} mm`;
+        if (last) text += ".";
     } else if (state.phase === "solids") text = "The motion is up to date; solids and gaps are being made …";
     else if (state.phase) text = state.version ? `Working: ${state.phase} …` : "The first page is being made …";
     if (!state.fault && !solving?.running && state.stale) text += " These values were not solved for these parameters: Solve does.";
@@ -130,7 +131,7 @@ function progress(solving) {
     };
     const parts = [];
     for (const power of [low, high]) {
-        parts.push(shape("path", { class: "grid", d: `M34 ${y(10 ** power)}H314` }), shape("text", { class: "tick end", x: 29, y: y(10 ** power) + 4 }, number(10 ** power)));
+        parts.push(shape("path", { class: "grid", d: `M34 ${y(10 ** power)}H314` }), shape("text", { class: "tick end", x: 29, y: y(10 ** power) + 4 }, Math.abs(power) > 3 ? `1e${power}`.replace("-", "−") : number(10 ** power)));
     }
     names.forEach((name, k) => {
         const d = points.map((p, i) => `${i ? "L" : "M"}${x(p.n).toFixed(1)} ${y(value(p, name)).toFixed(1)}`).join("");
@@ -190,7 +191,7 @@ function follow(state) {
     fault(state.fault);
     if (bench) {
         sliders(state.parameters);
-        progress(state.solving?.running || state.stale === false ? state.solving : null);
+        progress(state.solving);
         byId("live-solve").hidden = !state.solvable;
         byId("live-solve").disabled = Boolean(state.fault) || state.solving?.running || !(state.stale || state.unfinished);
         byId("live-stop").hidden = !state.solving?.running;
