@@ -328,9 +328,9 @@ fn saves_errors_and_sliders_arrive() {
 fn a_save_ends_an_optimisation() {
     let slow = |mm: u32| {
         let text = with_reach(f64::from(mm)).replace("cycle 4 steps", "cycle 40 steps");
-        text.replace(
-            "}\n",
-            "    minimize { track(tip), stress(below = 0.1 MPa), torque(bend, scale = 0.01 N*mm) }\n}\n",
+        let (body, _) = text.rsplit_once('}').unwrap();
+        format!(
+            "{body}    minimize {{ track(tip), stress(below = 0.1 MPa), torque(bend, scale = 0.01 N*mm) }}\n}}\n"
         )
     };
     let view = View::of(&slow(30));
