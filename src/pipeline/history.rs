@@ -8,9 +8,12 @@ use std::sync::{Mutex, PoisonError};
 /// Iterations that are kept at most.
 const MOST: usize = 16;
 
+/// Number of an iteration, and its terms by name.
+type Noted = (usize, Vec<(String, f64)>);
+
 /// Notes what is told while an optimisation runs.
 #[derive(Default)]
-pub struct Recorder(Mutex<Vec<(usize, Vec<(String, f64)>)>>);
+pub struct Recorder(Mutex<Vec<Noted>>);
 
 impl Recorder {
     /// An iteration is done.
@@ -33,7 +36,11 @@ impl Recorder {
         let values = |t: usize| chosen.iter().filter_map(move |(_, terms)| Some(rounded(terms.get(t)?.1)));
         History {
             iterations: chosen.iter().map(|(number, _)| *number).collect(),
-            terms: names.iter().enumerate().map(|(t, name)| (one_word(name), values(t).collect())).collect(),
+            // What is nothing throughout tells nothing.
+            terms: (names.iter().enumerate())
+                .map(|(t, name)| (one_word(name), values(t).collect::<Vec<f64>>()))
+                .filter(|(_, values)| values.iter().any(|v| *v != 0.0))
+                .collect(),
         }
     }
 }

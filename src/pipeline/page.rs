@@ -71,7 +71,7 @@ pub fn emit(request: &Request, known: &Known<'_>, stages: &dyn Stages, out: &mut
         plate: known.plate,
         started,
         figures: figures(known.assembly, out.before.as_ref(), out.after.as_ref()),
-        checks: out.requirements.iter().map(check).collect(),
+        checks: out.requirements.iter().map(|r| check(r, known.plate.parts.is_empty())).collect(),
         plots: plots(known),
         parameters: out.parameters.iter().filter(|p| !p.free).map(fixed).collect(),
         solved: solved(known, &out.histories, stages),
@@ -118,8 +118,16 @@ fn findings(
     all.into_iter().filter(|d| d.severity >= Severity::Advice).map(shown).collect()
 }
 
-fn check(r: &super::RequirementResult) -> Check {
-    Check { text: r.text.clone(), value: r.value, bound: r.bound, unit: r.unit.to_string(), pass: r.pass }
+fn check(r: &super::RequirementResult, without_solids: bool) -> Check {
+    let open = without_solids && r.value.is_none();
+    Check {
+        text: r.text.clone(),
+        value: r.value,
+        bound: r.bound,
+        unit: r.unit.to_string(),
+        pass: r.pass,
+        open,
+    }
 }
 
 /// Whether an earlier instance of the same design says the same.

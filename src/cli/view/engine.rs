@@ -362,11 +362,12 @@ impl Engine {
         });
         let Some(text) = out.lock.take() else { return self.failed(wish, &out) };
         // A newer text goes on from the best point found, and only its own result is worth a file.
-        if request.overrides.is_empty() && !self.is_late(wish.number) {
-            if let Err(e) = write_atomic(&lock_path, text.as_bytes()) {
-                out.diagnostics.push(placeless(Severity::Error, "E0731", e.to_string()));
-                return self.failed(wish, &out);
-            }
+        if request.overrides.is_empty()
+            && !self.is_late(wish.number)
+            && let Err(e) = write_atomic(&lock_path, text.as_bytes())
+        {
+            out.diagnostics.push(placeless(Severity::Error, "E0731", e.to_string()));
+            return self.failed(wish, &out);
         }
         let finished = is_converged(&text);
         self.tell(|inner| {

@@ -76,6 +76,8 @@ pub struct Check {
     pub unit: String,
     /// Whether it holds.
     pub pass: bool,
+    /// It cannot be measured without solids, and there are none.
+    pub open: bool,
 }
 
 /// How a design was solved.
@@ -259,6 +261,7 @@ impl Finding {
 struct Page<'r> {
     of: &'r Report<'r>,
     failing: usize,
+    open: usize,
     drawing: String,
     plots: Vec<(&'r Plot, String)>,
     sheets: Vec<sheet::Told>,
@@ -310,7 +313,8 @@ pub fn report_html(report: &Report<'_>) -> Result<Vec<u8>, String> {
     let (data, blob) = pack::pack(report)?;
     let page = Page {
         of: report,
-        failing: report.checks.iter().filter(|c| !c.pass).count(),
+        failing: report.checks.iter().filter(|c| !c.pass && !c.open).count(),
+        open: report.checks.iter().filter(|c| c.open).count(),
         drawing: svg_drawing(report.scene),
         plots: report.plots.iter().map(|p| (p, p.svg(&report.scene.times_s))).collect(),
         sheets: report.plate.parts.iter().map(sheet::told).collect(),
