@@ -18,8 +18,8 @@ const MANUAL: &str = include_str!("../docs/language.md");
 
 /// About the command and its surroundings: there is no text to point into.
 const PLACELESS: &[&str] = &[
-    "E0730", "E0731", "E0752", "W0753", "E0754", "E0755", "E0760", "E0761", "E0762", "E0763", "E0764",
-    "E0770", "W0727",
+    "E0730", "E0731", "E0752", "W0753", "E0754", "E0755", "E0756", "E0757", "E0760", "E0761", "E0762",
+    "E0763", "E0764", "E0770", "W0727",
 ];
 /// The compiler's own faults, told instead of a panic: no text is known that leads there.
 const OWN_FAULTS: &[&str] = &["E0630", "E0631", "E0643", "E0646", "E0647", "E0648", "E0720", "E0750"];

@@ -110,7 +110,8 @@ fn the_lock_it_gives() {
                 format!("{path} = {} {unit}", three(number.parse().unwrap()))
             }
             _ => match line.split_once(' ') {
-                Some((word @ ("design" | "values" | "iterations"), _)) => format!("{word} …"),
+                Some((word @ ("design" | "values" | "iterations" | "history"), _)) => format!("{word} …"),
+                Some(("term", rest)) => format!("term {} …", rest.split(' ').next().unwrap()),
                 _ => line.into(),
             },
         };

@@ -56,6 +56,8 @@ fn each_dependency_is_seen_by_one_folder() {
         ("lsp_types", "lsp/"),
         ("clap", "cli/"),
         ("notify", "cli/"),
+        ("tiny_http", "cli/view/"),
+        ("getrandom", "cli/view/"),
         ("indicatif", "cli/"),
         ("ctrlc", "cli/"),
         ("quick_xml", "cli/"),

@@ -28,6 +28,7 @@ mod sources;
 mod style;
 mod test;
 mod usage;
+mod view;
 mod watch;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
@@ -104,6 +105,8 @@ enum Command {
     Coupon(coupon::Arguments),
     /// Speak with an editor: the language server, on the standard input and output
     Lsp(lsp::Lsp),
+    /// Show a design as it is written: its report in a browser, renewed with every save
+    View(view::View),
 }
 
 const EXAMPLES: &str = "Examples:
@@ -111,6 +114,7 @@ const EXAMPLES: &str = "Examples:
   flexura build leg.mech                   solve it, write parts and sketches into out/
   flexura build leg.mech --set \"r=25 mm\"  try another size
   flexura build leg.mech --watch           again after every change
+  flexura view leg.mech                    see it move while you write, with sliders
   flexura simulate leg.mech -o motion.csv  the motion as a table
   flexura fmt                              one look for all files
 
@@ -301,6 +305,7 @@ fn configured(mut cli: Cli, matches: &clap::ArgMatches) -> u8 {
         Command::Completions(arguments) => shells::completions(arguments),
         Command::Man(arguments) => shells::man(arguments),
         Command::Lsp(arguments) => lsp::lsp(arguments),
+        Command::View(arguments) => view::view(arguments),
     };
     match threads {
         None => run(),

@@ -7,13 +7,15 @@ use super::joined::{self, Solid};
 use super::products::{self, Built};
 use super::progress::Iteration;
 use super::report::{Place, Worst};
-use super::scene::Moving;
+use super::scene::{Moving, scene};
 use super::solids;
 use super::stability;
 use super::stages::{Between, Checked, Failed, Parts, Response, Simulation, Solved, Stages};
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
+use crate::emit::plate::Plate;
+use crate::emit::scene::Scene;
 use crate::equilibrium::{
     Cycle, Equilibrium, Layout, LayoutTrace, Model, ModelError, PointForce, SAME_MM, Solver, SweepError,
     apart_mm, load_factors, sweep,
@@ -64,6 +66,7 @@ impl Stages for Compiler {
             variants: out.variants,
             others: out.others,
             files: out.files,
+            values: out.values,
             diagnostics: out.diagnostics,
         }
     }
@@ -202,6 +205,20 @@ impl Stages for Compiler {
         let made = products::artefacts(&whole);
         found.extend(made.diagnostics);
         Ok(Parts { diagnostics: found, ..made })
+    }
+
+    fn outline(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Result<(Scene, Plate), Failed> {
+        let (mut outlined, mut moving) = (Vec::new(), Vec::new());
+        for (design, values) in assembly.designs.iter().zip(values) {
+            let design = &*gravity::weighed(design, values);
+            let (layout, _) = layout(design, values)?;
+            let model = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
+            let cycle = sweep(&model).map_err(|e| lost(design, &e))?;
+            moving.push(Moving::new(design, &layout, &model, &cycle));
+            outlined.push(solids::outlined(design, &layout, &model, &cycle));
+        }
+        let scene = scene(assembly, &moving, &outlined, &joined::outlines(assembly, &outlined));
+        Ok((scene, Plate { name: assembly.name.clone(), parts: Vec::new() }))
     }
 }
 

@@ -7,7 +7,7 @@ use crate::geometry::joined::{Frame, Share, Whole, join};
 use crate::geometry::link::BodyPlan;
 use crate::geometry::{
     Carving, Fusion, GeometryError, LeastGap, Member, Mesh, MovedState, Part, Parts, PartsInput,
-    carved_cycle_gaps,
+    carved_cycle_gaps, parts::groups,
 };
 use crate::ir::assembly::Joined;
 use crate::ir::{Assembly, Instance};
@@ -68,6 +68,31 @@ pub struct Printed {
     pub links: Vec<((usize, usize), Mesh)>,
     /// Its flexures: the instance and the index there.
     pub flexures: Vec<(usize, usize)>,
+}
+
+/// Every part as the primitives that it is planned of, not united: what can be looked at, not printed.
+pub fn outlines(assembly: &Assembly, solids: &[Solid]) -> Vec<Printed> {
+    let mut out = Vec::new();
+    for (i, instance) in assembly.instances.iter().enumerate() {
+        let Some(solid) = solids.get(instance.design) else { continue };
+        for bodies in groups(&solid.input) {
+            let link = |b: &usize| {
+                let mut mesh = Mesh::default();
+                for slot in solid.parts.plans.get(*b)?.meshes(&solid.input.facets) {
+                    mesh.append(&slot);
+                }
+                Some(((i, *b), mesh.placed(&instance.placement)))
+            };
+            out.push(Printed {
+                name: String::new(),
+                at: instance.origin,
+                mesh: Mesh::default(),
+                links: bodies.iter().filter_map(link).collect(),
+                flexures: flexures_of(&solid.input, &bodies).map(|f| (i, f)).collect(),
+            });
+        }
+    }
+    out
 }
 
 /// All printed parts, and findings that do not stop the work.

@@ -7,12 +7,14 @@ mod code;
 mod compiler;
 mod examine;
 mod gravity;
+mod history;
 mod joined;
 mod lay;
 mod lints;
 mod manifest;
 mod measure;
 mod page;
+mod parameters;
 mod products;
 mod progress;
 mod reach;
@@ -25,8 +27,10 @@ mod stages;
 pub use aims::{AimSeries, DirectionMeasures, OutputMeasures};
 pub use compiler::{Compiler, EDGES};
 pub use examine::{Examined, Extent, Values, examine};
+pub use history::History;
 pub use manifest::COMPILER;
 pub use measure::{aggregate, check_requirements, is_closed, measure};
+pub use parameters::{Parameter, of as parameters};
 pub use progress::{Iteration, Progress, Stage};
 pub use report::{
     Artefact, BuildOutcome, DriveMeasures, GapMeasures, Kept, Measures, Origin, Place, RequirementResult,
@@ -178,13 +182,18 @@ fn run_build(
     // Values to files.
     let clock = Clock::start(progress, Stage::Mesh);
     let mut shown = None;
-    if assembly.exports.iter().any(|e| e.export.kind.of_solids())
-        && let Some(parts) = keep(stages.parts(&assembly, &values), &mut out.diagnostics)
-    {
-        out.artefacts.extend(parts.artefacts);
-        shown = parts.shown;
-        tell_once(parts.diagnostics, out);
-        lints::parts(&assembly, out);
+    if assembly.exports.iter().any(|e| e.export.kind.of_solids()) {
+        match keep(stages.parts(&assembly, &values), &mut out.diagnostics) {
+            Some(parts) => {
+                out.artefacts.extend(parts.artefacts);
+                shown = parts.shown;
+                tell_once(parts.diagnostics, out);
+                lints::parts(&assembly, out);
+            }
+            // What cannot be printed can be looked at.
+            None if page::is_asked(&assembly) => shown = stages.outline(&assembly, &values).ok(),
+            None => {}
+        }
     }
     clock.stop(&mut out.seconds.mesh);
     let clock = Clock::start(progress, Stage::Emit);
@@ -311,6 +320,7 @@ fn read(
 ) -> Option<(Assembly, Vec<Assembly>)> {
     let checked =
         stages.check(&request.source, &request.overrides, request.steps, request.variant.as_deref(), files);
+    out.parameters = parameters::of(&checked);
     out.sources = checked.sources;
     out.variants = checked.variants;
     out.files = checked.files;
@@ -360,13 +370,15 @@ fn solve_all(
     let locks = read_locks(request, assembly, out).ok()?;
     let mut origins = Vec::new();
     let mut solved: Vec<(String, Lock)> = Vec::new();
+    out.histories.clear();
     for (design, lock) in assembly.designs.iter().zip(locks) {
         if assembly.designs.len() > 1 {
             progress.design(&design.name);
         }
-        let solution = solve(request, design, lock, stages, progress, cancel, out)?;
+        let (solution, history) = solve(request, design, lock, stages, progress, cancel, out)?;
         origins.push(out.solved_from);
-        solved.push((design.name.clone(), Lock::new(design, solution)));
+        out.histories.push(history.clone());
+        solved.push((design.name.clone(), Lock { history, ..Lock::new(design, solution) }));
     }
     let solutions = solved.iter().map(|(_, l)| l.solution.clone()).collect();
     let lock = match (assembly.designs.as_slice(), solved.as_slice()) {
@@ -389,14 +401,14 @@ fn solve(
     progress: &dyn Progress,
     cancel: &AtomicBool,
     out: &mut BuildOutcome,
-) -> Option<Solution> {
+) -> Option<(Solution, History)> {
     let start = match lock {
         Some((lock, LockState::Current)) if !request.resume || lock.solution.converged => {
             if !lock.solution.converged {
                 out.diagnostics.push(not_converged(design));
             }
             out.solved_from = Origin::Lock;
-            return Some(lock.solution);
+            return Some((lock.solution, lock.history));
         }
         _ if request.frozen => {
             out.diagnostics.push(frozen(design, request));
@@ -417,12 +429,16 @@ fn solve(
             design.free.iter().map(|v| v.start).collect()
         }
     };
+    let recorder = history::Recorder::default();
     let solved = if design.free.is_empty() || design.all_objectives().next().is_none() {
         // Nothing to decide, or nothing to decide it by.
         let values = design.free.iter().map(|v| v.path.clone()).zip(start).collect();
         Solved { solution: Solution { values, iterations: 0, converged: true }, ..Solved::default() }
     } else {
-        let told = |iteration: &Iteration| progress.iteration(iteration);
+        let told = |iteration: &Iteration| {
+            recorder.note(iteration);
+            progress.iteration(iteration);
+        };
         keep(stages.optimize(design, &start, &told, cancel), &mut out.diagnostics)?
     };
     out.diagnostics.extend(solved.diagnostics);
@@ -432,7 +448,7 @@ fn solve(
                 .help("the best point found is kept in the lock; `--resume` goes on from it"),
         );
     }
-    Some(solved.solution)
+    Some((solved.solution, recorder.history()))
 }
 
 /// The lock and what it is worth for each design; `Err` if it cannot be understood.

@@ -1,12 +1,14 @@
 //! From all that a build knows to the [`Report`]: which numbers, curves and lists it shows.
 
+use super::history::History;
+use super::parameters::Parameter;
 use super::report::{Artefact, BuildOutcome, Measures};
 use super::stages::{Simulation, Stages};
 use super::{Request, starts};
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::emit::plate::Plate;
 use crate::emit::report::{
-    self, Bought, Check, Figure, Finding, Motor, Plot, Report, Series, Solved, Variable, Wiring,
+    self, Bought, Check, Figure, Finding, Fixed, Motor, Plot, Report, Series, Solved, Variable, Way, Wiring,
 };
 use crate::emit::scene::Scene;
 use crate::ir::{
@@ -46,13 +48,15 @@ pub fn is_asked(assembly: &Assembly) -> bool {
     assembly.exports.iter().any(|e| e.export.kind == ExportKind::Report)
 }
 
-/// What the check told, as the report will show it: a report is not the same if this is not.
+/// What the check told, as the report will show it, with parameters and the way of the optimiser: a report is not the same
+/// if this is not.
 pub fn told_early(request: &Request, out: &BuildOutcome, checked: usize) -> String {
     let early = out.diagnostics.get(..checked).unwrap_or_default().to_vec();
     let mut text = String::new();
     for f in findings(request, out, early, out.reached) {
         let _ = writeln!(text, "{f:?}");
     }
+    let _ = writeln!(text, "{:?} {:?}", out.histories, out.parameters);
     text
 }
 
@@ -67,9 +71,10 @@ pub fn emit(request: &Request, known: &Known<'_>, stages: &dyn Stages, out: &mut
         plate: known.plate,
         started,
         figures: figures(known.assembly, out.before.as_ref(), out.after.as_ref()),
-        checks: out.requirements.iter().map(check).collect(),
+        checks: out.requirements.iter().map(|r| check(r, known.plate.parts.is_empty())).collect(),
         plots: plots(known),
-        solved: solved(known, stages),
+        parameters: out.parameters.iter().filter(|p| !p.free).map(fixed).collect(),
+        solved: solved(known, &out.histories, stages),
         findings: findings(request, out, out.diagnostics.clone(), Reached::Parts),
         bought: bought(known.assembly),
         wiring: motors(known).iter().map(Wiring::of).collect(),
@@ -113,8 +118,16 @@ fn findings(
     all.into_iter().filter(|d| d.severity >= Severity::Advice).map(shown).collect()
 }
 
-fn check(r: &super::RequirementResult) -> Check {
-    Check { text: r.text.clone(), value: r.value, bound: r.bound, unit: r.unit.to_string(), pass: r.pass }
+fn check(r: &super::RequirementResult, without_solids: bool) -> Check {
+    let open = without_solids && r.value.is_none();
+    Check {
+        text: r.text.clone(),
+        value: r.value,
+        bound: r.bound,
+        unit: r.unit.to_string(),
+        pass: r.pass,
+        open,
+    }
 }
 
 /// Whether an earlier instance of the same design says the same.
@@ -286,7 +299,11 @@ fn aim_errors(known: &Known<'_>) -> Vec<Series> {
     out
 }
 
-fn solved(known: &Known<'_>, stages: &dyn Stages) -> Vec<Solved> {
+fn fixed(p: &Parameter) -> Fixed {
+    Fixed { path: p.path.clone(), text: p.text.clone(), doc: p.doc.clone() }
+}
+
+fn solved(known: &Known<'_>, histories: &[History], stages: &dyn Stages) -> Vec<Solved> {
     let assembly = known.assembly;
     let all = assembly.designs.iter().enumerate().zip(known.solutions).zip(known.values);
     all.map(|(((k, design), solution), values)| {
@@ -302,10 +319,20 @@ fn solved(known: &Known<'_>, stages: &dyn Stages) -> Vec<Solved> {
             iterations: solution.iterations,
             converged: solution.converged,
             terms: terms.collect(),
+            way: histories.get(k).and_then(way),
             variables: design.free.iter().zip(values).map(|(v, value)| variable(v, *value)).collect(),
         }
     })
     .collect()
+}
+
+/// The terms over the iterations, largest first; what is nothing throughout is left out.
+fn way(history: &History) -> Option<Way> {
+    let mut terms = history.terms.clone();
+    terms.retain(|(_, values)| values.iter().any(|v| *v > 0.0));
+    terms.sort_by(|a, b| b.1.first().unwrap_or(&0.0).total_cmp(a.1.first().unwrap_or(&0.0)));
+    let way = Way { iterations: history.iterations.clone(), terms };
+    (!history.is_empty() && !way.terms.is_empty()).then_some(way)
 }
 
 fn variable(v: &FreeVariable, value: f64) -> Variable {

@@ -1,6 +1,8 @@
 //! What a build tells: the numbers before and after, what was required, what was made, how long it took.
 
 use super::aims::{DirectionMeasures, OutputMeasures};
+use super::history::History;
+use super::parameters::Parameter;
 use super::stability::Stability;
 use crate::diagnostic::{Diagnostic, SourceMap};
 use crate::elaborate::OwnFile;
@@ -227,6 +229,10 @@ pub struct BuildOutcome {
     pub solution: Option<Solution>,
     /// Where they came from.
     pub solved_from: Origin,
+    /// How the optimiser came to them, one a design; empty where nothing tells of it.
+    pub histories: Vec<History>,
+    /// The parameters of what is built.
+    pub parameters: Vec<Parameter>,
     /// Measures at the design's start.
     pub before: Option<Measures>,
     /// Measures of the result.

@@ -1,10 +1,11 @@
 //! The geometry stage as the pipeline uses it: what can be printed, and its findings as diagnostics.
 
-use super::joined::Planned;
+use super::joined::{Planned, Solid};
 use super::report::Place;
 use super::stages::Failed;
 use crate::diagnostic::Diagnostic;
 use crate::equilibrium::{Cycle, Layout, Model};
+use crate::geometry::link::plan_body;
 use crate::geometry::{
     Carving, Cut, CycleGaps, Fusion, GeometryError, LeastGap, Member, MovedState, Parts, build_wanted_parts,
     carve, carved_cycle_gaps, flexure_solid, parts_input, plan_bodies,
@@ -88,6 +89,14 @@ pub fn gaps(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> (
     };
     let gaps = carved_cycle_gaps(&plans, &states, &carving, input.clearance_mm, |_, _| false);
     (gaps, carving)
+}
+
+/// A design as its bodies are planned, without any solid; a body that cannot be planned has no form.
+pub fn outlined(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> Solid {
+    let input = parts_input(design, layout, model);
+    let plans = (0..input.bodies.len()).map(|b| plan_body(&input, b).unwrap_or_default()).collect();
+    let parts = Parts { parts: Vec::new(), plans, carving: Carving::default(), fusions: Vec::new() };
+    Solid { input, parts, states: states(design, layout, model, cycle) }
 }
 
 /// A design as it is planned; none where there are no solids to measure.

@@ -6,7 +6,7 @@ use super::progress::Iteration;
 use super::report::{Artefact, Worst};
 use super::stability::Stability;
 use crate::diagnostic::{Diagnostic, SourceMap};
-use crate::elaborate::{Files, OwnFile};
+use crate::elaborate::{Files, KnownValue, OwnFile};
 use crate::emit::csv::MotionTable;
 use crate::emit::plate::Plate;
 use crate::emit::scene::Scene;
@@ -30,6 +30,8 @@ pub struct Checked {
     pub others: Vec<Assembly>,
     /// The design's own files as understood.
     pub files: Vec<OwnFile>,
+    /// What names came to.
+    pub values: Vec<KnownValue>,
     /// Findings.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -200,6 +202,15 @@ pub trait Stages {
     /// # Errors
     /// Where no closed solid comes out.
     fn parts(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Result<Parts, Failed>;
+
+    /// The mechanism in motion without uniting anything: links as the primitives that they are planned of, flexures as
+    /// they bend, and an empty bed. It takes a sweep, where [`Self::parts`] takes solids.
+    ///
+    /// # Errors
+    /// Where no equilibrium is found.
+    fn outline(&self, _assembly: &Assembly, _values: &[Vec<f64>]) -> Result<(Scene, Plate), Failed> {
+        Err(Failed::new())
+    }
 
     /// An STL a printed part of a mechanism by itself, in its own coordinates.
     ///

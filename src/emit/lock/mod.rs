@@ -7,6 +7,8 @@
 //! values sha256:…         digest of the entries: notices an edit or a bad merge
 //! iterations 23
 //! converged true
+//! history 0 1 2 23        which iterations are told of (16 at most)
+//! term track(tip) 12.3 1.45 0.8 0.021   and what a term of the objective was there
 //!
 //! heel.thickness = 0.8 mm
 //! ```
@@ -18,7 +20,9 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
+mod history;
 mod several;
+pub use history::History;
 pub use several::Head;
 
 /// Raised whenever the solver would find something else for the same design.
@@ -41,6 +45,8 @@ pub struct Lock {
     pub units: BTreeMap<String, String>,
     /// Whether the values are the ones that were written (false: edited since).
     pub intact: bool,
+    /// How the optimiser came to the values, where that was kept. Nothing depends on it.
+    pub history: History,
     /// Headings by name where the lock is of several designs.
     pub named: BTreeMap<String, Head>,
 }
@@ -61,7 +67,7 @@ impl Lock {
     pub fn new(design: &Design, solution: Solution) -> Self {
         let units = design.free.iter().map(|v| (v.path.clone(), v.unit.clone())).collect();
         let (design, solver) = (design_digest(design), SOLVER_VERSION.into());
-        Self { design, solver, solution, units, intact: true, named: BTreeMap::new() }
+        Self { design, solver, solution, units, intact: true, ..Self::default() }
     }
 
     /// What this lock is worth for a design.
@@ -98,12 +104,13 @@ impl Lock {
             (self.solution.iterations.to_string(), self.solution.converged.to_string());
         format!(
             "{TITLE}\n# The solved design. Keep it beside its source; `flexura build` reads and writes it.\n\
-             {}solver {}\nvalues {}\n{}{}\n{entries}",
+             {}solver {}\nvalues {}\n{}{}{}\n{entries}",
             line("design", &self.design, |h| h.design.clone()),
             self.solver,
             digest(entries.as_bytes()),
             line("iterations", &iterations, |h| h.iterations.to_string()),
             line("converged", &converged, |h| h.converged.to_string()),
+            history::lines(self),
         )
     }
 
@@ -267,6 +274,9 @@ impl Parser<'_> {
     fn header(&mut self, line: &str, at: Origin, written_digest: &mut Option<String>) {
         let (key, value) = line.split_once(' ').unwrap_or((line, ""));
         let value = value.trim();
+        if matches!(key, "history" | "term") {
+            return self.told(key, value, at);
+        }
         if let ("design" | "iterations" | "converged", Some((name, value))) = (key, value.split_once(' ')) {
             return self.named(key, name, value, at);
         }
@@ -292,6 +302,15 @@ impl Parser<'_> {
             },
             _ => self.fail("E0703", "this line is neither `path = value unit` nor a known heading", at),
         }
+    }
+
+    /// A line of the history. It names its design where there are several.
+    fn told(&mut self, key: &str, value: &str, at: Origin) {
+        let line = history::Line::read(key, value);
+        let Some(line) = line.filter(|l| history::keep(&mut self.lock, l)) else {
+            return self.fail("E0703", format!("`{key}` has a value that cannot be read"), at);
+        };
+        self.once(&format!("{key} {} {}", line.design, line.term), at);
     }
 
     /// A heading of one of several designs.

@@ -13,6 +13,8 @@ pub struct Head {
     pub iterations: usize,
     /// Whether it converged.
     pub converged: bool,
+    /// How it went.
+    pub history: super::History,
 }
 
 impl Lock {
@@ -26,7 +28,12 @@ impl Lock {
             out.solution.converged &= s.converged;
             out.solution.values.extend(s.values.iter().map(|(path, v)| (format!("{name}.{path}"), *v)));
             out.units.extend(lock.units.iter().map(|(path, u)| (format!("{name}.{path}"), u.clone())));
-            let head = Head { design: lock.design, iterations: s.iterations, converged: s.converged };
+            let head = Head {
+                design: lock.design,
+                iterations: s.iterations,
+                converged: s.converged,
+                history: lock.history,
+            };
             out.named.insert(name, head);
         }
         out
@@ -47,6 +54,7 @@ impl Lock {
             self.solution.values.iter().filter_map(|(p, v)| Some((inside(p)?, *v))).collect();
         out.solution.iterations = head.iterations;
         out.solution.converged = head.converged;
+        out.history = head.history;
         out
     }
 }

@@ -16,7 +16,7 @@ fn sample() -> Lock {
         },
         units: units.map(|(p, u)| (p.to_string(), u.to_string())).into(),
         intact: true,
-        named: BTreeMap::new(),
+        ..Lock::default()
     }
 }
 

@@ -1,12 +1,15 @@
 //! The report: one HTML file that needs nothing else, to look at a solved design and to move it. Plain data in, one page
 //! out; the same data give the same bytes. Numbers come with their units, as they are to be read.
 
+pub mod live;
 mod pack;
 mod plot;
 mod text;
+mod way;
 mod wiring;
 
 pub use plot::{Plot, Series};
+pub use way::Way;
 pub use wiring::{Motor, Wiring};
 
 use super::drawing::svg_drawing;
@@ -33,6 +36,8 @@ pub struct Report<'a> {
     pub checks: Vec<Check>,
     /// Quantities over the cycle.
     pub plots: Vec<Plot>,
+    /// Parameters that are not free.
+    pub parameters: Vec<Fixed>,
     /// How each design was solved.
     pub solved: Vec<Solved>,
     /// Findings, as their levels have them.
@@ -71,6 +76,8 @@ pub struct Check {
     pub unit: String,
     /// Whether it holds.
     pub pass: bool,
+    /// It cannot be measured without solids, and there are none.
+    pub open: bool,
 }
 
 /// How a design was solved.
@@ -86,8 +93,21 @@ pub struct Solved {
     pub converged: bool,
     /// Terms of the objective: name, at the start, at the end.
     pub terms: Vec<(String, f64, f64)>,
+    /// The terms on the way there, where that is known.
+    pub way: Option<Way>,
     /// Its free variables.
     pub variables: Vec<Variable>,
+}
+
+/// A parameter that stays as it is written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fixed {
+    /// As `--set` names it.
+    pub path: String,
+    /// Value and unit.
+    pub text: String,
+    /// What the text says of it.
+    pub doc: String,
 }
 
 /// A free variable with its bounds.
@@ -241,12 +261,14 @@ impl Finding {
 struct Page<'r> {
     of: &'r Report<'r>,
     failing: usize,
+    open: usize,
     drawing: String,
     plots: Vec<(&'r Plot, String)>,
     sheets: Vec<sheet::Told>,
     machines: Vec<(String, Vec<(&'static str, String)>)>,
     data: String,
     blob: String,
+    policy: &'static str,
     style: &'static str,
     script: &'static str,
     three: &'static str,
@@ -291,16 +313,18 @@ pub fn report_html(report: &Report<'_>) -> Result<Vec<u8>, String> {
     let (data, blob) = pack::pack(report)?;
     let page = Page {
         of: report,
-        failing: report.checks.iter().filter(|c| !c.pass).count(),
+        failing: report.checks.iter().filter(|c| !c.pass && !c.open).count(),
+        open: report.checks.iter().filter(|c| c.open).count(),
         drawing: svg_drawing(report.scene),
         plots: report.plots.iter().map(|p| (p, p.svg(&report.scene.times_s))).collect(),
         sheets: report.plate.parts.iter().map(sheet::told).collect(),
         machines: sheet::machines(report.plate),
         data,
         blob,
+        policy: live::POLICY,
         style: include_str!("page/report.css"),
-        script: include_str!("page/report.js"),
-        three: include_str!("three/three.min.js"),
+        script: live::SCRIPT,
+        three: live::THREE,
     };
     page.render().map(String::into_bytes).map_err(|e| e.to_string())
 }

@@ -2,8 +2,14 @@
 (() => {
 "use strict";
 const byId = (id) => document.getElementById(id);
-const data = JSON.parse(byId("data").textContent);
-const last = data.times.length - 1;
+let data, last, duration;
+/** Takes the description that stands in the page. */
+function adopt() {
+    data = JSON.parse(byId("data").textContent);
+    last = data.times.length - 1;
+    duration = Math.max(data.times[last] || 1, 1e-3);
+}
+adopt();
 
 // ---- the block of arrays -----------------------------------------------------------------------
 async function unpack() {
@@ -39,9 +45,8 @@ function frames(block, s) {
 
 // ---- time ----------------------------------------------------------------------------------------
 const slider = byId("time"), clock = byId("clock"), play = byId("play");
-const followers = [];
+let plotFollowers = [], viewFollowers = [];
 let state = 0, running = false, way = 1, lastTime = 0;
-const duration = Math.max(data.times[last] || 1, 1e-3);
 
 function go(to, fromSlider) {
     state = Math.min(Math.max(to, 0), last);
@@ -49,7 +54,7 @@ function go(to, fromSlider) {
     const time = (data.times[Math.floor(state)] || 0) + (state % 1) * duration / Math.max(last, 1);
     clock.textContent = `${time.toFixed(2)} s · ${Math.round(state)}/${last}`;
     slider.setAttribute("aria-valuetext", `${time.toFixed(2)} seconds, state ${Math.round(state)} of ${last}`);
-    for (const follow of followers) follow(state);
+    for (const follow of [...plotFollowers, ...viewFollowers]) follow(state);
 }
 
 function run(on) {
@@ -101,12 +106,14 @@ function shown(v) {
     const size = Math.abs(v);
     return (size >= 100 ? v.toFixed(0) : size >= 10 ? v.toFixed(1) : v.toFixed(2)).replace("-", "−");
 }
+function wirePlots() {
+plotFollowers = [];
 for (const plot of data.plots) {
     const svg = document.querySelector(`svg[data-plot="${plot.id}"]`);
     const outputs = document.querySelectorAll(`output[data-value="${plot.id}"]`);
     const line = svg.querySelector(".cursor path"), dots = svg.querySelectorAll(".cursor circle");
     const [left, right, bottom, top, low, high] = plot.frame;
-    followers.push((s) => {
+    plotFollowers.push((s) => {
         const below = Math.min(Math.floor(s), Math.max(last - 1, 0)), share = s - below;
         const x = left + (right - left) * s / Math.max(last, 1);
         line.setAttribute("d", `M${x.toFixed(1)} ${top}V${bottom}`);
@@ -128,13 +135,16 @@ for (const plot of data.plots) {
     svg.addEventListener("pointerdown", (e) => { svg.setPointerCapture(e.pointerId); seek(e); });
     svg.addEventListener("pointermove", (e) => { if (svg.hasPointerCapture(e.pointerId)) seek(e); });
 }
+}
 
 // ---- the mechanism -------------------------------------------------------------------------------
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-function build(block) {
+/** The view of what stands in the block; `old` is the one that it follows, whose place it takes. */
+function build(block, old) {
     const T = THREE, canvas = byId("view"), stage = byId("stage");
-    const renderer = new T.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    const renderer = old ? old.renderer : new T.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    const left = old ? old.leave() : null, ending = new AbortController(), signal = ending.signal;
     renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
     const scene = new T.Scene(), camera = new T.PerspectiveCamera(28, 1, 1, 10000);
     const hemisphere = new T.HemisphereLight(0xffffff, 0x8790a0, 1.9), sun = new T.DirectionalLight(0xffffff, 2.1), fill = new T.DirectionalLight(0xffffff, 0.5);
@@ -357,8 +367,8 @@ function build(block) {
     controls.zoomToCursor = true;
     canvas.style.touchAction = "pan-y";
     // The wheel scrolls the page until the view is taken into hand.
-    canvas.addEventListener("pointerdown", () => { controls.enableZoom = true; });
-    canvas.addEventListener("focusout", () => { controls.enableZoom = false; });
+    canvas.addEventListener("pointerdown", () => { controls.enableZoom = true; }, { signal });
+    canvas.addEventListener("focusout", () => { controls.enableZoom = false; }, { signal });
     const from = { iso: [0.45, 0.38, 1], front: [0, 0, 1], top: [0, 1, 0.0001], right: [1, 0, 0] };
     if (data.flat && Math.abs(data.flat[2]) > 0.9) from.iso = [0.28, 0.3, 1];
     // Where something is at some time: what a view has to hold.
@@ -419,6 +429,7 @@ function build(block) {
         due = true;
         requestAnimationFrame(() => {
             due = false;
+            if (signal.aborted) return;
             renderer.render(scene, camera);
             document.documentElement.dataset.drawn = state.toFixed(3);
         });
@@ -441,7 +452,7 @@ function build(block) {
         camera.position.copy(controls.target).add(away);
         controls.update();
         draw();
-    });
+    }, { signal });
     const resize = () => {
         const { clientWidth: w, clientHeight: h } = stage;
         if (!w || !h) return;
@@ -463,18 +474,18 @@ function build(block) {
         draw();
     };
     const chosen = (name) => document.querySelector(`input[name="${name}"]:checked`).value;
-    document.querySelectorAll('input[name="show"]').forEach((i) => i.addEventListener("change", () => show(i.value)));
+    document.querySelectorAll('input[name="show"]').forEach((i) => i.addEventListener("change", () => show(i.value), { signal }));
     document.querySelectorAll('input[name="colour"]').forEach((i) => i.addEventListener("change", () => {
         colouring = i.value;
         recolour.forEach((f) => f());
         show(chosen("show"));
-    }));
-    document.querySelectorAll("button[data-view]").forEach((b) => b.addEventListener("click", () => { touched = false; fit(b.dataset.view); }));
+    }, { signal }));
+    document.querySelectorAll("button[data-view]").forEach((b) => b.addEventListener("click", () => { touched = false; fit(b.dataset.view); }, { signal }));
     byId("scale").style.setProperty("--shades", `linear-gradient(90deg, ${data.shades.join(",")})`);
 
     byId("drawing").hidden = true;
     canvas.hidden = byId("look").hidden = false;
-    followers.push((at) => { movers.forEach((f) => f(at)); draw(); });
+    viewFollowers = [(at) => { movers.forEach((f) => f(at)); draw(); }];
     // A cycle is closed where all bodies end as they begin.
     closed = data.links.every((l) => {
         if (l.like) return true;
@@ -482,12 +493,88 @@ function build(block) {
         return n <= 0 || Math.hypot(p[n] - p[0], p[n + 1] - p[1], p[n + 2] - p[2]) < 1e-3 * size;
     });
     colouring = chosen("colour");
-    new ResizeObserver(resize).observe(stage);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
+    const observer = new ResizeObserver(resize);
+    observer.observe(stage);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint, { signal });
     resize();
-    fit();
+    fit(left?.view);
+    if (left?.touched) {
+        // Whoever has turned it goes on looking from there.
+        touched = true;
+        camera.position.copy(left.position);
+        controls.target.copy(left.target);
+        controls.update();
+    }
     show(chosen("show"));
     paint();
+    return {
+        renderer,
+        camera,
+        /** Ends it: what it held is free, and where it looked from is given on. */
+        leave() {
+            ending.abort();
+            observer.disconnect();
+            controls.dispose();
+            scene.traverse((o) => o.geometry?.dispose());
+            for (const look of [...looks, flexureLook, ghostLook, traceLook, targetLook, startLook]) look.dispose();
+            return { view, touched, position: camera.position.clone(), target: controls.target.clone() };
+        },
+    };
+}
+
+// ---- a newer page in place of this one -------------------------------------------------------------
+let viewer = null;
+async function show3d() {
+    try {
+        viewer = build(await unpack(), viewer);
+    } catch (why) {
+        byId("no3d").hidden = false;
+        byId("view").hidden = byId("look").hidden = true;
+        byId("drawing").hidden = false;
+        console.warn(String(why));
+    }
+}
+
+/** What can be kept of a section while a newer one takes its place: which details are open, how far tables are scrolled. */
+function replace(old, next) {
+    const open = new Map([...old.querySelectorAll("details")].map((d) => [d.firstElementChild?.firstChild?.textContent, d.open]));
+    for (const d of next.querySelectorAll("details")) d.open = open.get(d.firstElementChild?.firstChild?.textContent) ?? d.open;
+    old.replaceWith(next);
+}
+
+/** Takes over all of a newer report; the time in the cycle and the place of the camera stay. */
+async function swap(text) {
+    const doc = new DOMParser().parseFromString(text, "text/html"), share = last > 0 ? state / last : 0;
+    const same = doc.getElementById("data").textContent === byId("data").textContent && doc.getElementById("block").textContent === byId("block").textContent;
+    document.title = doc.title;
+    for (const what of [".top > div", "nav ul", "#drawing", "#key"]) {
+        const old = document.querySelector(what), next = doc.querySelector(what);
+        next.hidden = old.hidden;
+        old.replaceWith(next);
+    }
+    const main = byId("content"), before = [...main.querySelectorAll(":scope > section:not(#motion)")];
+    const name = (s) => s.getAttribute("aria-labelledby");
+    let after = [...main.children].filter((e) => !before.includes(e)).at(-1);
+    for (const next of [...doc.querySelectorAll("#content > section:not(#motion)")]) {
+        const old = before.find((s) => name(s) === name(next));
+        const kept = old && old.outerHTML === next.outerHTML ? old : next;
+        if (kept === next && old) replace(old, next);
+        if (kept.previousElementSibling !== after) after.after(kept);
+        after = kept;
+    }
+    const stay = new Set([...doc.querySelectorAll("#content > section")].map(name));
+    before.filter((s) => s.isConnected && !stay.has(name(s))).forEach((s) => s.remove());
+    if (!same) {
+        byId("data").textContent = doc.getElementById("data").textContent;
+        byId("block").textContent = doc.getElementById("block").textContent;
+    }
+    byId("scale").lastElementChild.textContent = doc.getElementById("scale").lastElementChild.textContent;
+    adopt();
+    slider.max = String(Math.max(last, 0));
+    byId("run").hidden = last < 1;
+    wirePlots();
+    if (!same) await show3d();
+    go(share * last);
 }
 
 async function main() {
@@ -496,16 +583,10 @@ async function main() {
     addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));
     byId("run").hidden = last < 1;
     byId("key").hidden = false;
-    try {
-        build(await unpack());
-    } catch (why) {
-        byId("no3d").hidden = false;
-        byId("view").hidden = byId("look").hidden = true;
-        byId("drawing").hidden = false;
-        console.warn(String(why));
-    }
+    wirePlots();
+    await show3d();
     go(0);
     document.documentElement.dataset.ready = "yes";
 }
-main();
+globalThis.flexura = { swap, ready: main(), look: () => ({ state, last, camera: viewer?.camera.position.toArray() ?? null }) };
 })();
