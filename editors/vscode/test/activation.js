@@ -78,6 +78,10 @@ class CodeActionKind {
 }
 for (const [name, value] of [["Empty", ""], ["QuickFix", "quickfix"], ["Refactor", "refactor"], ["RefactorExtract", "refactor.extract"], ["RefactorInline", "refactor.inline"], ["RefactorRewrite", "refactor.rewrite"], ["Source", "source"], ["SourceOrganizeImports", "source.organizeImports"]])
   CodeActionKind[name] = new CodeActionKind(value);
+class WorkspaceEdit {
+  constructor() { this.changes = new Map(); }
+  replace(uri, range, text) { this.changes.set(uri.toString(), [...(this.changes.get(uri.toString()) ?? []), [range, text]]); }
+}
 // What is only made and handed on: classes that keep what they are given.
 const plain = (name) => ({ [name]: class { constructor(...given) { this.given = given; } } })[name];
 const lenient = (own, missing) =>
@@ -98,7 +102,7 @@ const say = async (message) => void shown.push(message);
 const events = (name) => (name.startsWith("on") ? new EventEmitter().event : undefined);
 const vscode = lenient(
   {
-    version: "1.90.0", CodeActionKind, EventEmitter, Uri, CancellationTokenSource, Disposable,
+    version: "1.90.0", CodeActionKind, EventEmitter, WorkspaceEdit, Uri, CancellationTokenSource, Disposable,
     CancellationError: class extends Error {},
     env: { language: "en", appName: "stand-in", openExternal: async (uri) => opened.push(uri.toString()) > 0 },
     commands: {
@@ -187,13 +191,15 @@ async function main() {
   await commands.get("flexura.applyOptimised")();
   await commands.get("flexura.betterRest")();
   await until("edits", () => applied.length === 2);
+  for (const edit of applied) assert.deepStrictEqual([[...edit.changes.keys()], [...edit.changes.values()][0].length], [[document.uri.toString()], 1]);
   await commands.get("flexura.restart")();
   assert(commands.has("flexura.build"), "after a restart the commands are there again");
   vscode.window.activeTextEditor = undefined;
   await commands.get("flexura.build")();
   assert(shown.at(-1).startsWith("Open a .mech file"), shown.at(-1));
+  const count = commands.size;
   await extension.deactivate();
-  console.log(`activated: ${commands.size} commands, ${providers.size} providers; ${shown.filter((t) => t.includes("built"))[0]}`);
+  console.log(`activated: ${count} commands, ${providers.size} providers; ${shown.filter((t) => t.includes("built"))[0]}`);
 }
 
 main()
