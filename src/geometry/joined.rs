@@ -253,6 +253,10 @@ impl Placed<'_> {
             // The whole is not varied any more.
             follows: Vec::new(),
             bores: plan.bores.iter().map(bore).collect(),
+            pockets: plan.pockets.iter().map(|k| k.placed(p)).collect(),
+            carried: plan.carried.iter().map(|s| s.placed(p)).collect(),
+            // Told of the design that they belong to.
+            faults: Vec::new(),
             notes: plan.notes.clone(),
         }
     }
@@ -332,6 +336,10 @@ fn united(plans: Vec<(BodyPlan, usize)>) -> BodyPlan {
                 && (a.diameter_mm - b.diameter_mm).abs() < SAME_MM
         };
         out.bores.extend(plan.bores.into_iter().filter(|b| !known.iter().any(|k| is(k, b))));
+        let known = out.pockets.clone();
+        out.pockets.extend(plan.pockets.into_iter().filter(|p| !known.iter().any(|k| k.is(p, SAME_MM))));
+        let known = out.carried.clone();
+        out.carried.extend(plan.carried.into_iter().filter(|s| !known.iter().any(|k| k.is(s))));
         out.notes.extend(plan.notes);
     }
     out

@@ -7,6 +7,7 @@
 
 use super::anchor::{Anchor, FlexureEnd, Follow, SizeBy};
 use super::distance::nearer_than;
+use super::fitted::{FitFault, Pocket};
 use super::mesh::Mesh;
 use super::parts::{Bore, Eye, FLOOR_MM, FlexureSolid, GeometryError, PartsInput};
 use super::riser::Moving;
@@ -66,6 +67,8 @@ pub enum Role {
     Riser,
     /// Sleeve or bar of the conventional slider with this index.
     Guide(usize),
+    /// Carries a motor.
+    Mount,
 }
 
 /// A cylinder to be taken out of a body.
@@ -105,6 +108,12 @@ pub struct BodyPlan {
     pub follows: Vec<Follow>,
     /// What is then cut out.
     pub bores: Vec<BoreCut>,
+    /// Boxes that are cut out as well.
+    pub pockets: Vec<Pocket>,
+    /// Motors that it carries: not printed, but what moves must keep clear of them.
+    pub carried: Vec<Slot>,
+    /// What is wrong with the seats of motors and horns.
+    pub faults: Vec<FitFault>,
     /// What the maker should know.
     pub notes: Vec<String>,
 }
@@ -115,18 +124,15 @@ impl BodyPlan {
         self.slots.iter().enumerate().map(|(i, (_, s))| s.mesh(facets, spread(i))).collect()
     }
 
-    /// One closed mesh a bore. Its facets touch the stated circle from outside, so that a pin of
+    /// One closed mesh a bore, and one a pocket. The facets of a bore touch the stated circle from outside, so that a pin of
     /// that diameter passes.
     pub fn bore_meshes(&self, facets: &Facets) -> Vec<Mesh> {
-        self.bores
-            .iter()
-            .enumerate()
-            .map(|(i, b)| {
-                let n = ((facets.around / 4).max(2) * 4) as f64;
-                let radius = b.diameter_mm / 2.0 / (std::f64::consts::PI / n).cos();
-                Slot { disc_radius_mm: radius, ..b.slot() }.mesh(facets, spread(i + 100) + 0.5)
-            })
-            .collect()
+        let bores = self.bores.iter().enumerate().map(|(i, b)| {
+            let n = ((facets.around / 4).max(2) * 4) as f64;
+            let radius = b.diameter_mm / 2.0 / (std::f64::consts::PI / n).cos();
+            Slot { disc_radius_mm: radius, ..b.slot() }.mesh(facets, spread(i + 100) + 0.5)
+        });
+        bores.chain(self.pockets.iter().map(Pocket::mesh)).collect()
     }
 }
 
@@ -208,6 +214,13 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
     for hole in &body.holes {
         b.add_hole(hole);
     }
+    for seat in &body.seats {
+        b.add_seat(seat, body);
+    }
+    for mount in &body.mounts {
+        let node = b.add_mount(mount, true);
+        b.node(node, None, Anchor::Fixed);
+    }
     for p in body.skeleton.iter().filter(|p| !b.is_risen(p)).copied().collect::<Vec<_>>() {
         b.node(p, None, Anchor::Fixed);
     }
@@ -216,6 +229,7 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
         return Err(GeometryError::NoSkeleton(body.name.clone()));
     }
     b.connect(&body.name);
+    b.check_mounts(body);
     Ok(b.plan)
 }
 

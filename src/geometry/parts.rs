@@ -7,6 +7,7 @@
 
 use super::carve::{Carving, carve};
 use super::cycle::MovedState;
+use super::fitted::{MountSolid, SeatSolid};
 use super::gap::{Fusion, fusions};
 use super::link::{BodyPlan, plan_body};
 use super::mesh::Mesh;
@@ -62,6 +63,10 @@ pub struct BodySolid {
     pub guides: Vec<Guide>,
     /// Holes through it, each in a boss of its own.
     pub holes: Vec<HoleSolid>,
+    /// Motors that it carries.
+    pub mounts: Vec<MountSolid>,
+    /// Seats of motors' horns.
+    pub seats: Vec<SeatSolid>,
     /// A body that a flexure's template brings along.
     pub of_flexure: bool,
 }
