@@ -1,6 +1,8 @@
 //! Motors and horns as they stand at a body in the rest pose, and the boxes that are cut out for them.
 
+use super::distance::separation;
 use super::layers::joint_axis;
+use super::link::BodyPlan;
 use super::mesh::Mesh;
 use super::slot::{Slot, any_normal};
 use crate::equilibrium::Layout;
@@ -55,6 +57,17 @@ pub struct SeatSolid {
     pub origin: Origin,
 }
 
+/// A body that is a plate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlateSolid {
+    /// Thickness, mm.
+    pub thick_mm: f64,
+    /// How far it reaches beyond its nodes, mm; none: a little beyond their bosses.
+    pub margin_mm: Option<f64>,
+    /// Statement.
+    pub origin: Origin,
+}
+
 /// What is wrong with a seat.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitFault {
@@ -75,6 +88,10 @@ pub enum FitFaultKind {
     Wall(f64),
     /// The motor stands where its own body has a joint or a flexure's end.
     InTheWay,
+    /// What is printed with it keeps a driver from this many of its screws.
+    NoReach(usize),
+    /// A plate of a body without layers.
+    NoLayer,
 }
 
 /// A box that is cut out.
@@ -223,4 +240,32 @@ fn towards_others(design: &Design, layout: &Layout, joint: &Joint, body: BodyId)
         _ if joint.bodies.first() == Some(&body) => axis,
         _ => -axis,
     }
+}
+
+/// Screws of motors to which no driver reaches, because something that is printed in one piece with the motor's body stands over them
+/// in the rest pose.
+pub(super) fn out_of_reach(plans: &[BodyPlan], groups: &[Vec<usize>]) -> Vec<FitFault> {
+    let mut found: Vec<FitFault> = Vec::new();
+    for group in groups {
+        for body in group {
+            let Some(plan) = plans.get(*body) else { continue };
+            for (way, motor, origin) in &plan.access {
+                let others = group.iter().filter(|b| *b != body).filter_map(|b| plans.get(*b));
+                let mut slots = others.flat_map(|p| &p.slots);
+                if slots.all(|(_, s)| separation(way, s).gap_mm >= 0.0) {
+                    continue;
+                }
+                match found.iter_mut().find(|f| f.origin == *origin) {
+                    Some(FitFault { kind: FitFaultKind::NoReach(n), .. }) => *n += 1,
+                    _ => found.push(FitFault {
+                        motor: motor.clone(),
+                        kind: FitFaultKind::NoReach(1),
+                        at: way.start,
+                        origin: *origin,
+                    }),
+                }
+            }
+        }
+    }
+    found
 }

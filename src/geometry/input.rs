@@ -1,6 +1,6 @@
 //! From a design and its rods at given parameters to the input of the solids.
 
-use super::fitted::{is_borne_by_motor, mounts, seats};
+use super::fitted::{PlateSolid, is_borne_by_motor, mounts, seats};
 use super::layers::{guides, joint_axis, layers};
 use super::parts::{BodySolid, Bore, Eye, FlexureSolid, HoleSolid, PartsInput};
 use super::slot::Facets;
@@ -61,6 +61,11 @@ pub fn parts_input(design: &Design, layout: &Layout, model: &Model) -> PartsInpu
                 guides: guides(design, layout, b),
                 mounts: mounts(design, layout, b, &drawn),
                 seats: seats(design, layout, b),
+                plate: body.fittings.plate.as_ref().map(|p| PlateSolid {
+                    thick_mm: p.thick_mm,
+                    margin_mm: p.margin_mm,
+                    origin: p.origin,
+                }),
                 holes: body
                     .holes
                     .iter()

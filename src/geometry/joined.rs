@@ -253,6 +253,8 @@ impl Placed<'_> {
             // The whole is not varied any more.
             follows: Vec::new(),
             bores: plan.bores.iter().map(bore).collect(),
+            plates: plan.plates.iter().map(|k| k.placed(p)).collect(),
+            access: Vec::new(),
             pockets: plan.pockets.iter().map(|k| k.placed(p)).collect(),
             carried: plan.carried.iter().map(|s| s.placed(p)).collect(),
             // Told of the design that they belong to.
@@ -318,8 +320,10 @@ fn states(placed: &[Placed<'_>], bodies: usize) -> Vec<MovedState> {
 fn united(plans: Vec<(BodyPlan, usize)>) -> BodyPlan {
     let mut out = BodyPlan::default();
     for (plan, before) in plans {
-        let known = out.slots.len();
+        let (known, plates) = (out.slots.len(), out.plates.len());
+        out.plates.extend(plan.plates);
         for (role, slot) in plan.slots {
+            let role = if let Role::Plate(k) = role { Role::Plate(k + plates) } else { role };
             let earlier = out.slots.get(..known).unwrap_or_default();
             // A stub stays where its own flexure is cut free: each has its own.
             let stub = matches!(role, Role::Stub(_));

@@ -38,6 +38,7 @@ pub mod link;
 pub mod mesh;
 mod mount;
 pub mod parts;
+pub mod plate;
 pub mod ray;
 mod riser;
 mod seat;

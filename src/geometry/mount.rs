@@ -22,6 +22,8 @@ const OVERLAP_MM: f64 = 0.3;
 const LIP_MM: f64 = 1.5;
 /// Diameter of a screw's head, or of its nut over the corners, and room round it, as a part of the screw's.
 pub(super) const HEAD: f64 = 2.4;
+/// Room that a screw and its driver need over the seat, mm.
+const DRIVER_MM: f64 = 60.0;
 /// Radius of the edges of a motor's box as what moves sees it, mm.
 const EDGE_MM: f64 = 0.3;
 /// Widest bar of which such a box is made, mm: a corner is missed by 0.4 of its half.
@@ -187,6 +189,18 @@ impl Builder<'_> {
         let all = places(m, &screws);
         for at in &all {
             self.seat_bar(frame, [0.0; 2], *at, hole / 2.0 + wall, heights.seat);
+        }
+        if let [_, _, _, _] = all[..] {
+            for k in 0..4 {
+                self.seat_bar(frame, all[k], all[(k + 1) % 4], hole / 2.0 + wall, heights.seat);
+            }
+        }
+        let head = HEAD * screws.diameter_mm / 2.0;
+        for [x, y] in &all {
+            let [start, end] = [heights.all, heights.all + DRIVER_MM].map(|z| frame.at(*x, *y, z));
+            let way =
+                Slot::bar((start + end) / 2.0, (start + end) / 2.0, m.axis, head, DRIVER_MM / 2.0, EDGE_MM);
+            self.plan.access.push((way, m.motor.name.clone(), m.origin));
         }
         if let Some((diameter_mm, depth)) = opening {
             // What stands out goes into the seat where that leaves a floor, else the seat is open.

@@ -84,6 +84,9 @@ impl Builder<'_> {
             let follow = Follow::bar([p.anchor.clone(), q.anchor.clone()]);
             self.push_following(Role::Bar, Slot::capsule(p.at, q.at, radius), follow);
         }
+        if let Some(plate) = &body.plate {
+            self.add_plate(plate, false);
+        }
         self.check_mounts(body);
         Ok(())
     }

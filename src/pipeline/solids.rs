@@ -26,7 +26,8 @@ pub fn build(
     let input = parts_input(design, layout, model);
     let parts = build_wanted_parts(&input, states, wanted).map_err(|e| no_solid(design, &e))?;
     let mut found: Vec<Diagnostic> = parts.fusions.iter().map(|f| fusion(design, f)).collect();
-    found.extend(parts.plans.iter().flat_map(|p| &p.faults).map(|f| fit_fault(design, f)));
+    let faults = parts.plans.iter().flat_map(|p| &p.faults).chain(&parts.out_of_reach);
+    found.extend(faults.map(|f| fit_fault(design, f)));
     Ok((parts, found))
 }
 
@@ -39,6 +40,20 @@ fn fit_fault(design: &Design, fault: &FitFault) -> Diagnostic {
             Diagnostic::warning("W0649", message, fault.origin)
                 .label(format!("{near}; `{}` needs {:.2} mm", process.name, process.least_wall_mm))
                 .help("give the seat less `clearance`, or take a motor whose screws are farther apart")
+        }
+        FitFaultKind::NoReach(count) => {
+            let message = format!("no driver reaches {count} of the screws of `{motor}`");
+            Diagnostic::warning("W0649", message, fault.origin)
+                .label("what is printed in one piece with its link stands over them")
+                .help(
+                    "turn the motor with `toward`, take one with flanges, or lead the links round its screws",
+                )
+        }
+        FitFaultKind::NoLayer => {
+            let message = "a body that does not lie in a layer cannot be a plate";
+            Diagnostic::warning("W0649", message, fault.origin)
+                .label("it is made of round bars in space")
+                .help("a plate needs a body whose hinges have one direction, with its points at one height")
         }
         FitFaultKind::InTheWay => {
             let message = format!("`{motor}` stands where its own link holds something else");
