@@ -115,7 +115,11 @@ impl Lower<'_> {
 
     fn fitted(&mut self, node: &Node) -> Option<Fitted> {
         let mut names = self.idents(node).into_iter();
-        let (motor, body) = (names.next()?, names.next()?);
+        let (motor, mut body) = (names.next()?, names.next()?);
+        if let Some(inner) = names.next() {
+            body.node = format!("{}.{}", body.node, inner.node);
+            body.at.end = inner.at.end;
+        }
         let point = self.value(node)?;
         let clause = |c: &Node| Some((self.named(c.first(Kind::Keyword)?), self.value(c)?));
         let clauses = node.all(Kind::Fitted).filter_map(clause).collect();
