@@ -22,6 +22,8 @@ const OVERLAP_MM: f64 = 0.3;
 const LIP_MM: f64 = 1.5;
 /// Diameter of a screw's head, or of its nut over the corners, and room round it, as a part of the screw's.
 pub(super) const HEAD: f64 = 2.4;
+/// Width of the ring round an opening, in walls: what is less leaves slits beside the arms.
+const RING: f64 = 1.5;
 /// Room that a screw and its driver need over the seat, mm.
 const DRIVER_MM: f64 = 60.0;
 /// Radius of the edges of a motor's box as what moves sees it, mm.
@@ -184,7 +186,7 @@ impl Builder<'_> {
     fn face(&mut self, m: &MountSolid, frame: &Frame, heights: Heights, screws: MotorScrews) -> Vector3<f64> {
         let (wall, hole) = (self.wall(), screws.diameter_mm + m.clearance_mm);
         let opening = m.motor.pilot_mm.map(|(d, depth)| (d + 2.0 * m.clearance_mm, depth));
-        let ring = opening.map_or(self.boss_radius(), |(d, _)| d / 2.0 + wall);
+        let ring = opening.map_or(self.boss_radius(), |(d, _)| d / 2.0 + RING * wall);
         self.seat_bar(frame, [0.0; 2], [0.0; 2], ring, heights.seat);
         let all = places(m, &screws);
         for at in &all {

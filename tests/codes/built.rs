@@ -200,7 +200,7 @@ mechanism nodder {
     drive motor from -5 deg to 5 deg with xl330_m288
     trace tip = B on rocker
     minimize { track(tip) }
-    require max(stress()) <= petg.strength
+    require max(error(tip)) <= 1 mm
     export stl
 }
 ";
