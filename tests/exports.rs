@@ -238,7 +238,7 @@ fn outlines_of_plates_enclose_the_part() {
     assert!(round >= 1, "the hole is an outline of its own, the other way round");
     assert!(least.abs() < 1e-4, "where the part lies: {least}");
     let bent = built(&FLAP.replace("export stl, stl(assembled), 3mf, sheet, glb, svg, png", "export dxf"), 1);
-    assert_eq!(codes(&bent), ["W0649"]);
+    assert_eq!(codes(&bent), ["W0650"]);
 }
 
 #[test]

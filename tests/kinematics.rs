@@ -5,8 +5,8 @@ use flexura::diagnostic::Diagnostic;
 use flexura::elaborate::{Options, elaborate};
 use flexura::ir::expr::{ExprGraph, Node};
 use flexura::ir::{
-    Body, Cycle, Design, Drive, DriveUnit, ExprPoint, FreeVariable, Joint, JointKind, Layers, Material,
-    NamedPoint, Origin, Process, Profile, Realization, Trace,
+    Body, Cycle, Design, Drive, DriveUnit, ExprPoint, Fittings, FreeVariable, Joint, JointKind, Layers,
+    Material, NamedPoint, Origin, Process, Profile, Realization, Trace,
 };
 use flexura::kinematics::{Mechanism, Mobility, Motion, solve_motion};
 use nalgebra::Vector3;
@@ -74,6 +74,7 @@ impl Builder {
             layer,
             owner: None,
             holes: Vec::new(),
+            fittings: Fittings::default(),
             printed: None,
             origin,
         });

@@ -82,6 +82,7 @@ codes! {
     CYCLES_DIFFER "E0460" "instances whose cycles differ";
     SHARED "E0461" "a body that a mirrored instance cannot share";
     MIXED "E0462" "one body of two materials or processes";
+    FITTING "E0463" "a mount or horn that its motor or its place does not allow";
     LATER_STATEMENT "E0901" "a statement that is not available yet";
     LATER_TERM "E0902" "an objective, query, export or function that is not available yet";
     LATER_JOINT "E0903" "a kind of joint that is not available yet";

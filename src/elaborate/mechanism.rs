@@ -49,6 +49,7 @@ impl<'a> Evaluator<'a> {
             None => self.missing(&sheet, m, "process", "`print on polyjet`"),
         };
         let mut s = self.structure(scope, &sheet, m.name.at);
+        self.fittings(scope, module, &sheet, &mut s);
         let strings = self.strings(scope, &sheet, &mut s);
         let clearance = process.as_ref().map(|(_, p)| p.clearance_mm);
         let layers = self.layers(scope, &sheet, &s, clearance).ok();
@@ -254,6 +255,8 @@ fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
     for b in &mut design.bodies {
         b.skeleton.iter_mut().flat_map(|p| &mut p.position).for_each(&mut *f);
         b.holes.iter_mut().flat_map(|h| &mut h.position).for_each(&mut *f);
+        let mounts = b.fittings.mounts.iter_mut();
+        mounts.flat_map(|m| m.position.iter_mut().chain(m.toward.iter_mut().flatten())).for_each(&mut *f);
     }
     for j in &mut design.joints {
         j.point.iter_mut().for_each(&mut *f);

@@ -80,6 +80,7 @@ impl<'a> Evaluator<'a> {
                 layer: site.layer,
                 owner: Some(site.joint),
                 holes: Vec::new(),
+                fittings: Default::default(),
                 printed: None,
                 origin: s.at,
             });

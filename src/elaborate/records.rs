@@ -65,6 +65,20 @@ const MOTOR: &[Field] = &[
     field("resolution", Dimension::ANGLE, false),
     field("least_pulse", Dimension::TIME, false),
     field("most_pulse", Dimension::TIME, false),
+    field("body_length", Dimension::LENGTH, false),
+    field("body_width", Dimension::LENGTH, false),
+    field("body_height", Dimension::LENGTH, false),
+    field("body_end", Dimension::LENGTH, false),
+    field("screw", Dimension::LENGTH, false),
+    field("screw_pitch", Dimension::LENGTH, false),
+    field("screw_across", Dimension::LENGTH, false),
+    field("pilot", Dimension::LENGTH, false),
+    field("pilot_height", Dimension::LENGTH, false),
+    field("spline", Dimension::LENGTH, false),
+    field("horn", Dimension::LENGTH, false),
+    field("horn_screws", Dimension::NUMBER, false),
+    field("horn_circle", Dimension::LENGTH, false),
+    field("horn_screw", Dimension::LENGTH, false),
 ];
 
 fn fields_of(kind: &str) -> Option<&'static [Field]> {
@@ -165,7 +179,7 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Checks that a record has the fields it needs and no others; evaluates all.
-    fn check_record(&mut self, item: ItemRef) -> Outcome<&'a Record> {
+    pub(super) fn check_record(&mut self, item: ItemRef) -> Outcome<&'a Record> {
         let Some(record) = self.record(item) else { return Err(super::eval::Failed) };
         let known = fields_of(&record.kind.node).unwrap_or_default();
         self.limit(record.fields.len(), "fields", record.name.at)?;
@@ -228,7 +242,7 @@ impl<'a> Evaluator<'a> {
     }
 
     /// A numeric field that must be positive; none if not stated.
-    fn positive_field(&mut self, item: ItemRef, name: &str) -> Outcome<Option<f64>> {
+    pub(super) fn positive_field(&mut self, item: ItemRef, name: &str) -> Outcome<Option<f64>> {
         let v = self.number_field(item, name)?;
         if let (Some(x), Some(record)) = (v, self.record(item))
             && x <= 0.0
@@ -371,7 +385,7 @@ impl<'a> Evaluator<'a> {
         self.fail(Diagnostic::error(codes::RECORD, format!("{what} needs `{name}`"), at))
     }
 
-    fn whole_field(&mut self, item: ItemRef, name: &str, what: &str) -> Outcome<u32> {
+    pub(super) fn whole_field(&mut self, item: ItemRef, name: &str, what: &str) -> Outcome<u32> {
         let v = self.needed_field(item, name, what)?;
         if v.fract() != 0.0 || v > 1e6 {
             let at = self.record(item).map(|r| r.name.at).unwrap_or_default();

@@ -55,6 +55,9 @@ pub struct Sheet<'a> {
     pub strings: Vec<(&'a ast::Cable, Origin)>,
     pub loads: Vec<(&'a ast::Load, Origin)>,
     pub holes: Vec<(&'a ast::Hole, Origin)>,
+    pub mounts: Vec<(&'a ast::Fitted, Origin)>,
+    pub horns: Vec<(&'a ast::Fitted, Origin)>,
+    pub plates: Vec<(&'a ast::Plate, Origin)>,
     pub rests: Vec<(&'a Ident, &'a Expr, Origin)>,
     pub traces: Vec<TraceText<'a>>,
     /// Traced directions.
@@ -181,6 +184,9 @@ impl<'a> Evaluator<'a> {
             }
             StatementKind::Load(load) => sheet.loads.push((load, at)),
             StatementKind::Hole(hole) => sheet.holes.push((hole, at)),
+            StatementKind::Mount(mount) => sheet.mounts.push((mount, at)),
+            StatementKind::Horn(horn) => sheet.horns.push((horn, at)),
+            StatementKind::Plate(plate) => sheet.plates.push((plate, at)),
             StatementKind::Rest { joint, value } => sheet.rests.push((joint, value, at)),
             StatementKind::Trace { name, direction: true, point, body } => {
                 if self.name_thing(scope, name, "direction") {

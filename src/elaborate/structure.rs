@@ -118,6 +118,7 @@ impl<'a> Evaluator<'a> {
             layer: layer.unwrap_or(0),
             owner: None,
             holes: Vec::new(),
+            fittings: Default::default(),
             printed: None,
             origin: text.at,
         })

@@ -16,6 +16,19 @@ pub struct Plate {
     pub name: String,
     /// Its parts.
     pub parts: Vec<Laid>,
+    /// What is bought besides.
+    pub bought: Vec<Bought>,
+}
+
+/// Something that is bought.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bought {
+    /// How many.
+    pub count: usize,
+    /// What.
+    pub name: String,
+    /// For what.
+    pub purpose: String,
 }
 
 /// A part on the bed.

@@ -38,10 +38,22 @@ pub fn print_sheet(plate: &Plate) -> String {
     if plate.parts.len() > 1 {
         let _ = writeln!(out, "\nSide by side they take {wide:.0} × {deep:.0} mm.");
     }
+    materials(&mut out, plate);
     for part in &plate.parts {
         lies(&mut out, part);
     }
     out
+}
+
+/// What is bought besides.
+fn materials(out: &mut String, plate: &Plate) {
+    if plate.bought.is_empty() {
+        return;
+    }
+    out.push_str("\n## To be bought\n\n| number | what | for |\n| --- | --- | --- |\n");
+    for thing in &plate.bought {
+        let _ = writeln!(out, "| {} | {} | {} |", thing.count, thing.name, thing.purpose);
+    }
 }
 
 fn process(out: &mut String, part: &Laid) {

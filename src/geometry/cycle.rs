@@ -187,7 +187,10 @@ fn state_gaps(
     let bodies: Vec<Vec<Piece>> = plans
         .iter()
         .zip(&moved.poses)
-        .map(|(plan, pose)| plan.slots.iter().map(|(r, s)| Piece::new(Some(*r), s.moved(pose))).collect())
+        .map(|(plan, pose)| {
+            let printed = plan.slots.iter().map(|(r, s)| Piece::new(Some(*r), s.moved(pose)));
+            printed.chain(plan.carried.iter().map(|s| Piece::new(None, s.moved(pose)))).collect()
+        })
         .collect();
     for (i, first) in bodies.iter().enumerate() {
         for (j, second) in bodies.iter().enumerate().skip(i + 1) {
@@ -210,6 +213,14 @@ fn state_gaps(
             };
             let member = (Member::Body(i), body.as_slice());
             if let Some(link) = carved.links.get(&i).filter(|_| carved.carving.made(i, f)) {
+                // What it carries is not carved.
+                let motors = body.get(plans[i].slots.len()..).unwrap_or_default();
+                search.compare(
+                    (Member::Body(i), motors),
+                    (Member::Flexure(f), pieces),
+                    f64::INFINITY,
+                    |_, _| false,
+                );
                 if !skipped(Member::Body(i), Member::Flexure(f)) {
                     let bound = search.least.map_or(f64::INFINITY, |l| l.gap_mm).min(CARVED_MM);
                     let pose = &moved.poses[i];

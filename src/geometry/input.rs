@@ -1,5 +1,6 @@
 //! From a design and its rods at given parameters to the input of the solids.
 
+use super::fitted::{PlateSolid, is_borne_by_motor, mounts, seats};
 use super::layers::{guides, joint_axis, layers};
 use super::parts::{BodySolid, Bore, Eye, FlexureSolid, HoleSolid, PartsInput};
 use super::slot::Facets;
@@ -31,11 +32,17 @@ pub fn parts_input(design: &Design, layout: &Layout, model: &Model) -> PartsInpu
                     has_node(j) && j.bodies.contains(&b) && (drawn(j.point) - p).norm() < SAME_POINT_MM
                 })
             };
-            let skeleton = body.skeleton.iter().map(|p| drawn(p.position)).filter(|p| !held(p));
+            // Where a motor sits, no bar ends.
+            let mounted = |p: &Vector3<f64>| {
+                body.fittings.mounts.iter().any(|m| (drawn(m.position) - p).norm() < SAME_POINT_MM)
+            };
+            let skeleton =
+                body.skeleton.iter().map(|p| drawn(p.position)).filter(|p| !held(p) && !mounted(p));
             let eyes =
                 design.joints.iter().enumerate().filter(|(_, j)| {
                     !j.is_compliant() && j.kind == JointKind::Hinge && j.bodies.contains(&b)
                 });
+            let eyes = eyes.filter(|(j, _)| !is_borne_by_motor(design, *j, b));
             BodySolid {
                 name: body.name.clone(),
                 of_flexure: body.owner.is_some(),
@@ -48,10 +55,17 @@ pub fn parts_input(design: &Design, layout: &Layout, model: &Model) -> PartsInpu
                         point: layout.rest_poses[b].point(&layout.joint_points[j]),
                         axis: joint_axis(design, layout, joint),
                         bore: bore(design, j, joint, b),
-                        slot: slot(design, joint, b),
+                        slot: slot(design, j, joint, b),
                     })
                     .collect(),
                 guides: guides(design, layout, b),
+                mounts: mounts(design, layout, b, &drawn),
+                seats: seats(design, layout, b),
+                plate: body.fittings.plate.as_ref().map(|p| PlateSolid {
+                    thick_mm: p.thick_mm,
+                    margin_mm: p.margin_mm,
+                    origin: p.origin,
+                }),
                 holes: body
                     .holes
                     .iter()
@@ -124,8 +138,9 @@ pub fn flexure_solid(
 }
 
 /// A body's place among the bodies of a conventional joint: by their own layers, upwards.
-fn slot(design: &Design, joint: &Joint, body: BodyId) -> (usize, usize) {
+fn slot(design: &Design, index: JointId, joint: &Joint, body: BodyId) -> (usize, usize) {
     let mut order = joint.bodies.clone();
+    order.retain(|b| !is_borne_by_motor(design, index, *b));
     order.sort_by_key(|b| design.bodies[*b].layer);
     (order.iter().position(|b| *b == body).unwrap_or(0), order.len())
 }

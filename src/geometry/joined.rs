@@ -253,6 +253,12 @@ impl Placed<'_> {
             // The whole is not varied any more.
             follows: Vec::new(),
             bores: plan.bores.iter().map(bore).collect(),
+            plates: plan.plates.iter().map(|k| k.placed(p)).collect(),
+            access: Vec::new(),
+            pockets: plan.pockets.iter().map(|k| k.placed(p)).collect(),
+            carried: plan.carried.iter().map(|s| s.placed(p)).collect(),
+            // Told of the design that they belong to.
+            faults: Vec::new(),
             notes: plan.notes.clone(),
         }
     }
@@ -314,8 +320,10 @@ fn states(placed: &[Placed<'_>], bodies: usize) -> Vec<MovedState> {
 fn united(plans: Vec<(BodyPlan, usize)>) -> BodyPlan {
     let mut out = BodyPlan::default();
     for (plan, before) in plans {
-        let known = out.slots.len();
+        let (known, plates) = (out.slots.len(), out.plates.len());
+        out.plates.extend(plan.plates);
         for (role, slot) in plan.slots {
+            let role = if let Role::Plate(k) = role { Role::Plate(k + plates) } else { role };
             let earlier = out.slots.get(..known).unwrap_or_default();
             // A stub stays where its own flexure is cut free: each has its own.
             let stub = matches!(role, Role::Stub(_));
@@ -332,6 +340,10 @@ fn united(plans: Vec<(BodyPlan, usize)>) -> BodyPlan {
                 && (a.diameter_mm - b.diameter_mm).abs() < SAME_MM
         };
         out.bores.extend(plan.bores.into_iter().filter(|b| !known.iter().any(|k| is(k, b))));
+        let known = out.pockets.clone();
+        out.pockets.extend(plan.pockets.into_iter().filter(|p| !known.iter().any(|k| k.is(p, SAME_MM))));
+        let known = out.carried.clone();
+        out.carried.extend(plan.carried.into_iter().filter(|s| !known.iter().any(|k| k.is(s))));
         out.notes.extend(plan.notes);
     }
     out

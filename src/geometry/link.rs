@@ -7,11 +7,14 @@
 
 use super::anchor::{Anchor, FlexureEnd, Follow, SizeBy};
 use super::distance::nearer_than;
+use super::fitted::{FitFault, Pocket};
 use super::mesh::Mesh;
 use super::parts::{Bore, Eye, FLOOR_MM, FlexureSolid, GeometryError, PartsInput};
+use super::plate::Prism;
 use super::riser::Moving;
 use super::skeleton::connect;
 use super::slot::{Facets, Slot};
+use crate::diagnostic::Origin;
 use nalgebra::Vector3;
 use std::cell::OnceCell;
 
@@ -66,6 +69,10 @@ pub enum Role {
     Riser,
     /// Sleeve or bar of the conventional slider with this index.
     Guide(usize),
+    /// Carries a motor.
+    Mount,
+    /// Covers the plate with this index; the plate is meshed in its place.
+    Plate(usize),
 }
 
 /// A cylinder to be taken out of a body.
@@ -105,28 +112,39 @@ pub struct BodyPlan {
     pub follows: Vec<Follow>,
     /// What is then cut out.
     pub bores: Vec<BoreCut>,
+    /// Plates that it is made of.
+    pub plates: Vec<Prism>,
+    /// Where screwdrivers have to reach, each with the motor and its statement.
+    pub access: Vec<(Slot, String, Origin)>,
+    /// Boxes that are cut out as well.
+    pub pockets: Vec<Pocket>,
+    /// Motors that it carries: not printed, but what moves must keep clear of them.
+    pub carried: Vec<Slot>,
+    /// What is wrong with the seats of motors and horns.
+    pub faults: Vec<FitFault>,
     /// What the maker should know.
     pub notes: Vec<String>,
 }
 
 impl BodyPlan {
-    /// One closed mesh a slot.
+    /// One closed mesh a slot; a plate's is that of its first one, the others have none.
     pub fn meshes(&self, facets: &Facets) -> Vec<Mesh> {
-        self.slots.iter().enumerate().map(|(i, (_, s))| s.mesh(facets, spread(i))).collect()
+        let mesh = |(i, (role, slot)): (usize, &(Role, Slot))| match role {
+            Role::Plate(_) => self.prism(i).map_or_else(Mesh::default, |p| p.mesh(facets)),
+            _ => slot.mesh(facets, spread(i)),
+        };
+        self.slots.iter().enumerate().map(mesh).collect()
     }
 
-    /// One closed mesh a bore. Its facets touch the stated circle from outside, so that a pin of
+    /// One closed mesh a bore, and one a pocket. The facets of a bore touch the stated circle from outside, so that a pin of
     /// that diameter passes.
     pub fn bore_meshes(&self, facets: &Facets) -> Vec<Mesh> {
-        self.bores
-            .iter()
-            .enumerate()
-            .map(|(i, b)| {
-                let n = ((facets.around / 4).max(2) * 4) as f64;
-                let radius = b.diameter_mm / 2.0 / (std::f64::consts::PI / n).cos();
-                Slot { disc_radius_mm: radius, ..b.slot() }.mesh(facets, spread(i + 100) + 0.5)
-            })
-            .collect()
+        let bores = self.bores.iter().enumerate().map(|(i, b)| {
+            let n = ((facets.around / 4).max(2) * 4) as f64;
+            let radius = b.diameter_mm / 2.0 / (std::f64::consts::PI / n).cos();
+            Slot { disc_radius_mm: radius, ..b.slot() }.mesh(facets, spread(i + 100) + 0.5)
+        });
+        bores.chain(self.pockets.iter().map(Pocket::mesh)).collect()
     }
 }
 
@@ -208,6 +226,13 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
     for hole in &body.holes {
         b.add_hole(hole);
     }
+    for seat in &body.seats {
+        b.add_seat(seat, body);
+    }
+    for mount in &body.mounts {
+        let node = b.add_mount(mount, true);
+        b.node(node, None, Anchor::Fixed);
+    }
     for p in body.skeleton.iter().filter(|p| !b.is_risen(p)).copied().collect::<Vec<_>>() {
         b.node(p, None, Anchor::Fixed);
     }
@@ -215,7 +240,9 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
     if b.nodes.is_empty() {
         return Err(GeometryError::NoSkeleton(body.name.clone()));
     }
-    b.connect(&body.name);
+    let carries_all = body.plate.as_ref().is_some_and(|p| b.add_plate(p, true));
+    b.connect(&body.name, carries_all);
+    b.check_mounts(body);
     Ok(b.plan)
 }
 
@@ -496,14 +523,17 @@ impl Builder<'_> {
         Slot::bar(middle, middle, self.axis(), radius, (high - low) / 2.0, ROUND_MM)
     }
 
-    /// Bars between the nodes, in the body's own layer.
-    fn connect(&mut self, name: &str) {
+    /// Bars between the nodes, in the body's own layer; none where a plate joins them.
+    fn connect(&mut self, name: &str, on_plate: bool) {
         for i in 0..self.nodes.len() {
             let (at, is_eye) = (self.nodes[i].at, self.nodes[i].own_eye.is_some());
             if !is_eye {
                 let anchor = self.nodes[i].anchor.clone();
                 self.boss(at, self.boss_radius(), &anchor);
             }
+        }
+        if on_plate {
+            return;
         }
         let points: Vec<Vector3<f64>> = self.nodes.iter().map(|n| n.at).collect();
         let net = connect(&points, |p, q| self.blocked(p, q));

@@ -7,6 +7,7 @@
 
 use super::carve::{Carving, carve};
 use super::cycle::MovedState;
+use super::fitted::{FitFault, MountSolid, PlateSolid, SeatSolid, out_of_reach};
 use super::gap::{Fusion, fusions};
 use super::link::{BodyPlan, plan_body};
 use super::mesh::Mesh;
@@ -62,6 +63,12 @@ pub struct BodySolid {
     pub guides: Vec<Guide>,
     /// Holes through it, each in a boss of its own.
     pub holes: Vec<HoleSolid>,
+    /// Motors that it carries.
+    pub mounts: Vec<MountSolid>,
+    /// It is a plate.
+    pub plate: Option<PlateSolid>,
+    /// Seats of motors' horns.
+    pub seats: Vec<SeatSolid>,
     /// A body that a flexure's template brings along.
     pub of_flexure: bool,
 }
@@ -187,6 +194,8 @@ pub struct Parts {
     pub carving: Carving,
     /// Places where things grow together that must not.
     pub fusions: Vec<Fusion>,
+    /// Motors whose screws no driver reaches.
+    pub out_of_reach: Vec<FitFault>,
 }
 
 /// Why no parts could be made.
@@ -260,6 +269,7 @@ fn build_planned(
 ) -> Result<Parts, GeometryError> {
     let groups = groups(input);
     let fusions = fusions(input, &plans, &groups, &carving);
+    let out_of_reach = out_of_reach(&plans, &groups);
     let build = |bodies: &Vec<usize>| {
         if wanted(bodies) {
             return build_part(input, &plans, &carving, bodies);
@@ -269,7 +279,7 @@ fn build_planned(
         Ok(Part { name, bodies: bodies.clone(), mesh: Mesh::default(), links: Vec::new(), notes })
     };
     let parts = groups.par_iter().map(build).collect::<Result<Vec<Part>, GeometryError>>()?;
-    Ok(Parts { parts, plans, carving, fusions })
+    Ok(Parts { parts, plans, carving, fusions, out_of_reach })
 }
 
 /// The primitives of every body, without any meshing: enough for distance checks.

@@ -48,6 +48,10 @@ impl Builder<'_> {
             self.hole_in_space(hole);
             self.node_in_space(hole.point, Anchor::Fixed);
         }
+        for mount in &body.mounts {
+            let node = self.add_mount(mount, false);
+            self.node_in_space(node, Anchor::Fixed);
+        }
         let apart = |p: &Vector3<f64>| body.eyes.iter().all(|e| (e.point - p).norm() >= SAME_NODE_MM);
         for p in body.skeleton.iter().filter(|p| apart(p)) {
             self.node_in_space(*p, Anchor::Fixed);
@@ -56,6 +60,9 @@ impl Builder<'_> {
             let others = body.eyes.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, e)| e.point);
             let places: Vec<Vector3<f64>> = self.nodes.iter().map(|n| n.at).chain(others).collect();
             self.eye_in_space(eye, &places, &body.name);
+        }
+        for seat in &body.seats {
+            self.add_seat(seat, body);
         }
         if self.nodes.is_empty() {
             return Err(GeometryError::NoSkeleton(body.name.clone()));
@@ -77,6 +84,10 @@ impl Builder<'_> {
             let follow = Follow::bar([p.anchor.clone(), q.anchor.clone()]);
             self.push_following(Role::Bar, Slot::capsule(p.at, q.at, radius), follow);
         }
+        if let Some(plate) = &body.plate {
+            self.add_plate(plate, false);
+        }
+        self.check_mounts(body);
         Ok(())
     }
 

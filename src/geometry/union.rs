@@ -43,8 +43,12 @@ const SHAKE_MM: f64 = 1e-12;
 /// # Errors
 /// No mesh, an operand that is not closed, or a failure of the kernel.
 pub fn union_all(meshes: &[Mesh]) -> Result<Mesh, BooleanError> {
-    let shaken: Vec<Mesh> =
-        meshes.iter().enumerate().map(|(i, m)| m.clone().shaken(SHAKE_MM, i as u64)).collect();
+    let shaken: Vec<Mesh> = meshes
+        .iter()
+        .enumerate()
+        .filter(|(_, m)| !m.triangles.is_empty())
+        .map(|(i, m)| m.clone().shaken(SHAKE_MM, i as u64))
+        .collect();
     union_tree(&shaken)
 }
 

@@ -33,7 +33,7 @@ pub(super) fn least_wall(plan: &BodyPlan, swept: &[(usize, &Field)]) -> Wall {
     let depth = Depth::new(least, plan, swept);
     // The ends: where something is attached, and where bars meet.
     let ends = plan.slots.iter().filter_map(|(role, s)| match role {
-        Role::Bar => None,
+        Role::Bar | Role::Mount | Role::Plate(_) => None,
         Role::Stub(_) | Role::Eye(_) | Role::Boss | Role::Riser | Role::Guide(_) => Some(s.start),
     });
     let Some(mut ends) = ends.map(|p| depth.nearest(&p)).collect::<Option<Vec<usize>>>() else {

@@ -60,6 +60,9 @@ pub fn printed_volume_and_center(plan: &BodyPlan, step_mm: f64) -> (f64, Vector3
     for bore in plan.bores.iter().map(|b| b.slot()) {
         field.near(&bore, reach, |p, value| *value = value.max(-bore.signed_distance(p)));
     }
+    for pocket in &plan.pockets {
+        field.near(&pocket.around(), reach, |p, value| *value = value.max(-pocket.signed_distance(p)));
+    }
     let cell = field.step.powi(3);
     let (mut volume, mut moment) = (0.0, Vector3::zeros());
     for (i, distance) in field.values.iter().enumerate() {

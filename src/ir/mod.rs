@@ -6,6 +6,7 @@ pub mod assembly;
 mod code;
 mod drive;
 pub mod expr;
+mod fit;
 mod load;
 mod model;
 mod solution;
@@ -16,6 +17,7 @@ pub use assembly::{Assembly, Instance, Placement};
 pub use code::{CodeKind, MotorMotion, Stretch, Wanted, Workspace};
 pub use drive::{Cable, Drive, DriveOn, DriveUnit, Profile};
 use expr::{ExprGraph, ExprId};
+pub use fit::{Fittings, Horn, HornForm, LinkPlate, MotorBody, MotorScrews, Mount};
 pub use load::{Load, LoadCase, LoadKind};
 pub use model::RodModel;
 use serde::{Deserialize, Serialize};
@@ -142,6 +144,9 @@ pub struct Body {
     /// Holes through it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub holes: Vec<Hole>,
+    /// Motors and horns on it, or that it is a plate.
+    #[serde(default, skip_serializing_if = "Fittings::is_empty")]
+    pub fittings: Fittings,
     /// What gravity needs of the printed form at some values; derived, and so no part of the design's text form.
     #[serde(skip)]
     pub printed: Option<PrintedExtra>,

@@ -73,6 +73,14 @@ pub fn expressions<'a>(s: &'a Statement, f: &mut dyn FnMut(&'a Expr)) {
             [&hole.diameter, &hole.point].into_iter().for_each(&mut *f);
             hole.along.iter().for_each(f);
         }
+        K::Mount(m) | K::Horn(m) => {
+            f(&m.point);
+            m.clauses.iter().for_each(|(_, e)| f(e));
+        }
+        K::Plate(p) => {
+            f(&p.thickness);
+            p.margin.iter().for_each(f);
+        }
         K::Rod(r) => {
             for end in [&r.from, &r.to] {
                 f(&end.position);

@@ -2,6 +2,7 @@
 //! optimisation and geometry.
 
 use super::aims::AimSeries;
+use super::bill;
 use super::gravity;
 use super::joined::{self, Solid};
 use super::products::{self, Built};
@@ -218,7 +219,8 @@ impl Stages for Compiler {
             outlined.push(solids::outlined(design, &layout, &model, &cycle));
         }
         let scene = scene(assembly, &moving, &outlined, &joined::outlines(assembly, &outlined));
-        Ok((scene, Plate { name: assembly.name.clone(), parts: Vec::new() }))
+        let bought = bill::bought(assembly);
+        Ok((scene, Plate { name: assembly.name.clone(), parts: Vec::new(), bought }))
     }
 }
 

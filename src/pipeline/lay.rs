@@ -1,5 +1,6 @@
 //! Printed parts on the bed, and what to say of them.
 
+use super::bill::bought;
 use super::joined::Printed;
 use super::scene::Moving;
 use crate::diagnostic::Diagnostic;
@@ -35,7 +36,11 @@ pub fn plate(assembly: &Assembly, moving: &[Moving], printed: &[Printed]) -> Pla
             flexures: flexures.iter().map(leaf).collect(),
         })
     };
-    Plate { name: assembly.name.clone(), parts: printed.par_iter().filter_map(lay).collect() }
+    Plate {
+        name: assembly.name.clone(),
+        parts: printed.par_iter().filter_map(lay).collect(),
+        bought: bought(assembly),
+    }
 }
 
 fn leaf(flexure: &FlexureSolid) -> Leaf {
@@ -55,7 +60,7 @@ pub fn uneven(plate: &Plate, at: Origin) -> Vec<Diagnostic> {
     };
     let told = |(name, band): (String, Band)| {
         Diagnostic::warning(
-            "W0649",
+            "W0650",
             format!("`{name}` is not made of plates: what its DXF shows are sections"),
             at,
         )

@@ -3,6 +3,7 @@
 
 mod aims;
 mod assembly;
+mod bill;
 mod code;
 mod compiler;
 mod examine;

@@ -8,12 +8,10 @@ use super::{Request, starts};
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::emit::plate::Plate;
 use crate::emit::report::{
-    self, Bought, Check, Figure, Finding, Fixed, Motor, Plot, Report, Series, Solved, Variable, Way, Wiring,
+    self, Check, Figure, Finding, Fixed, Motor, Plot, Report, Series, Solved, Variable, Way, Wiring,
 };
 use crate::emit::scene::Scene;
-use crate::ir::{
-    Aggregate, Assembly, Design, DriveUnit, ExportKind, FreeVariable, Quantity, Realization, Solution,
-};
+use crate::ir::{Aggregate, Assembly, Design, DriveUnit, ExportKind, FreeVariable, Quantity, Solution};
 use crate::lint::Stage as Reached;
 use std::fmt::Write;
 
@@ -76,7 +74,7 @@ pub fn emit(request: &Request, known: &Known<'_>, stages: &dyn Stages, out: &mut
         parameters: out.parameters.iter().filter(|p| !p.free).map(fixed).collect(),
         solved: solved(known, &out.histories, stages),
         findings: findings(request, out, out.diagnostics.clone(), Reached::Parts),
-        bought: bought(known.assembly),
+        bought: super::bill::bought(known.assembly),
         wiring: motors(known).iter().map(Wiring::of).collect(),
         files: out.artefacts.iter().map(|a| (a.name.clone(), a.bytes.len())).collect(),
     };
@@ -368,33 +366,4 @@ fn motors<'a>(known: &Known<'a>) -> Vec<Motor<'a>> {
         });
     }
     out
-}
-
-/// Motors, pins and strings.
-fn bought(assembly: &Assembly) -> Vec<Bought> {
-    // By what it is, in the order of first use: how many, and for what.
-    let mut all: Vec<(String, Vec<String>)> = Vec::new();
-    let mut count = |name: String, purpose: String| match all.iter_mut().find(|a| a.0 == name) {
-        Some((_, of)) => of.push(purpose),
-        None => all.push((name, vec![purpose])),
-    };
-    for first in &assembly.motors {
-        let Some(instance) = assembly.instances.get(first.instance) else { continue };
-        let drive = assembly.designs.get(instance.design).and_then(|d| d.drives.get(first.drive));
-        let Some((drive, motor)) = drive.and_then(|d| Some((d, d.motor.as_ref()?))) else { continue };
-        let drum = drive.drum_radius_mm.map_or(String::new(), |r| format!(", drum of {} mm", 2.0 * r));
-        count(format!("motor {}{drum}", motor.name), instance.of(&drive.name));
-    }
-    for (instance, design) in assembly.placed() {
-        for joint in &design.joints {
-            if let Realization::Conventional { pin_diameter_mm: Some(d) } = joint.realization {
-                count(format!("pin, {d} mm"), instance.of(&joint.name));
-            }
-        }
-        for string in &design.strings {
-            count("string".into(), instance.of(&string.name));
-        }
-    }
-    let told = |(name, of): (String, Vec<String>)| Bought { count: of.len(), name, purpose: of.join(", ") };
-    all.into_iter().map(told).collect()
 }

@@ -7,8 +7,8 @@ use crate::diagnostic::Diagnostic;
 use crate::equilibrium::{Cycle, Layout, Model};
 use crate::geometry::link::plan_body;
 use crate::geometry::{
-    Carving, Cut, CycleGaps, Fusion, GeometryError, LeastGap, Member, MovedState, Parts, build_wanted_parts,
-    carve, carved_cycle_gaps, flexure_solid, parts_input, plan_bodies,
+    Carving, Cut, CycleGaps, FitFault, FitFaultKind, Fusion, GeometryError, LeastGap, Member, MovedState,
+    Parts, build_wanted_parts, carve, carved_cycle_gaps, flexure_solid, parts_input, plan_bodies,
 };
 use crate::ir::{Design, Joint, JointKind};
 
@@ -26,8 +26,43 @@ pub fn build(
 ) -> Result<(Parts, Vec<Diagnostic>), Failed> {
     let input = parts_input(design, layout, model);
     let parts = build_wanted_parts(&input, states, wanted).map_err(|e| no_solid(design, &e))?;
-    let found = parts.fusions.iter().map(|f| fusion(design, f)).collect();
+    let mut found: Vec<Diagnostic> = parts.fusions.iter().map(|f| fusion(design, f)).collect();
+    let faults = parts.plans.iter().flat_map(|p| &p.faults).chain(&parts.out_of_reach);
+    found.extend(faults.map(|f| fit_fault(design, f)));
     Ok((parts, found))
+}
+
+fn fit_fault(design: &Design, fault: &FitFault) -> Diagnostic {
+    let (p, motor, process) = (fault.at, &fault.motor, &design.process);
+    let near = format!("near ({:.1}, {:.1}, {:.1}) mm of the rest pose", p.x, p.y, p.z);
+    match fault.kind {
+        FitFaultKind::Wall(wall) => {
+            let message = format!("a wall in the seat of `{motor}` is {wall:.2} mm thick");
+            Diagnostic::warning("W0649", message, fault.origin)
+                .label(format!("{near}; `{}` needs {:.2} mm", process.name, process.least_wall_mm))
+                .help("give the seat less `clearance`, or take a motor whose screws are farther apart")
+        }
+        FitFaultKind::NoReach(count) => {
+            let message = format!("no driver reaches {count} of the screws of `{motor}`");
+            Diagnostic::warning("W0649", message, fault.origin)
+                .label("what is printed in one piece with its link stands over them")
+                .help(
+                    "turn the motor with `toward`, take one with flanges, or lead the links round its screws",
+                )
+        }
+        FitFaultKind::NoLayer => {
+            let message = "a body that does not lie in a layer cannot be a plate";
+            Diagnostic::warning("W0649", message, fault.origin)
+                .label("it is made of round bars in space")
+                .help("a plate needs a body whose hinges have one direction, with its points at one height")
+        }
+        FitFaultKind::InTheWay => {
+            let message = format!("`{motor}` stands where its own link holds something else");
+            Diagnostic::warning("W0649", message, fault.origin)
+                .label(format!("they meet {near}"))
+                .help("turn the motor with `toward`, or move the link's points away from it")
+        }
+    }
 }
 
 /// Whether every body has something to be made of. A design without equilibrium is not judged here.
@@ -95,7 +130,13 @@ pub fn gaps(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> (
 pub fn outlined(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> Solid {
     let input = parts_input(design, layout, model);
     let plans = (0..input.bodies.len()).map(|b| plan_body(&input, b).unwrap_or_default()).collect();
-    let parts = Parts { parts: Vec::new(), plans, carving: Carving::default(), fusions: Vec::new() };
+    let parts = Parts {
+        parts: Vec::new(),
+        plans,
+        carving: Carving::default(),
+        fusions: Vec::new(),
+        out_of_reach: Vec::new(),
+    };
     Solid { input, parts, states: states(design, layout, model, cycle) }
 }
 
@@ -169,7 +210,11 @@ fn collision(design: &Design, worst: &LeastGap) -> Diagnostic {
 
 fn named(design: &Design, member: &Member) -> (String, crate::ir::Origin) {
     match *member {
-        Member::Body(b) => (format!("`{}`", design.bodies[b].name), design.bodies[b].origin),
+        Member::Body(b) => {
+            let body = &design.bodies[b];
+            let motor = if body.fittings.mounts.is_empty() { "" } else { " (with its motor)" };
+            (format!("`{}`{motor}", body.name), body.origin)
+        }
         Member::Flexure(r) => {
             (format!("the flexure `{}`", design.rods[r].path), design.joints[design.rods[r].joint].origin)
         }

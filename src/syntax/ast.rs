@@ -245,6 +245,12 @@ pub enum StatementKind {
     Load(Box<Load>),
     /// `hole DIAMETER on BODY at P [along D]`
     Hole(Box<Hole>),
+    /// `mount MOTOR on BODY at P [along D] [toward Q] [thick T] [clearance C]`
+    Mount(Box<Fitted>),
+    /// `horn MOTOR on BODY at P [deep D] [clearance C]`
+    Horn(Box<Fitted>),
+    /// `plate THICKNESS on BODY [margin M]`
+    Plate(Box<Plate>),
     /// `rod NAME { [axis second] from a at … along … to b at … along … section … }` (templates only)
     Rod(Box<Rod>),
     /// `place NAME = MECHANISM [{ overrides }] at P [turned A about D] [scale = K] [merging GROUND into BODY]…`
@@ -293,6 +299,30 @@ pub struct Cable {
     pub to: Ident,
     /// Through which points of that body, in order.
     pub via: Vec<Expr>,
+}
+
+/// A motor's place on a body, or that of its horn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fitted {
+    /// The motor.
+    pub motor: Ident,
+    /// The body.
+    pub body: Ident,
+    /// Where its shaft is.
+    pub point: Expr,
+    /// Clauses: keyword and value.
+    pub clauses: Vec<(Ident, Expr)>,
+}
+
+/// A body made as a plate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plate {
+    /// Thickness.
+    pub thickness: Expr,
+    /// The body.
+    pub body: Ident,
+    /// How far it reaches beyond what it carries.
+    pub margin: Option<Expr>,
 }
 
 /// A hole through a body.

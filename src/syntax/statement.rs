@@ -1,8 +1,8 @@
 //! Statements: concrete tree to [`ast::StatementKind`].
 
 use super::ast::{
-    Allow, At, Cable, Compare, Expr, Hole, Ident, Joint, Load, Profile, Rod, RodEnd, Statement,
-    StatementKind, TemplateUse, Term,
+    Allow, At, Cable, Compare, Expr, Fitted, Hole, Ident, Joint, Load, Plate, Profile, Rod, RodEnd,
+    Statement, StatementKind, TemplateUse, Term,
 };
 use super::lower::Lower;
 use super::tree::{Kind, Node};
@@ -92,6 +92,13 @@ impl Lower<'_> {
                 let hole = Hole { diameter, body: self.ident(node)?, point, along: values.next() };
                 StatementKind::Hole(Box::new(hole))
             }
+            Kind::Mount => StatementKind::Mount(Box::new(self.fitted(node)?)),
+            Kind::Horn => StatementKind::Horn(Box::new(self.fitted(node)?)),
+            Kind::Plate => {
+                let mut values = self.values(node).into_iter();
+                let (thickness, body) = (values.next()?, self.ident(node)?);
+                StatementKind::Plate(Box::new(Plate { thickness, body, margin: values.next() }))
+            }
             Kind::Allow => StatementKind::Allow(self.allow(node)?),
             Kind::Assert => StatementKind::Assert(Box::new(self.assertion(node)?)),
             Kind::Variant => StatementKind::Variant(Box::new(self.variant(node)?)),
@@ -104,6 +111,19 @@ impl Lower<'_> {
 
     pub(super) fn values(&mut self, node: &Node) -> Vec<Expr> {
         node.all(Kind::Value).map(|n| self.expr(n)).collect()
+    }
+
+    fn fitted(&mut self, node: &Node) -> Option<Fitted> {
+        let mut names = self.idents(node).into_iter();
+        let (motor, mut body) = (names.next()?, names.next()?);
+        if let Some(inner) = names.next() {
+            body.node = format!("{}.{}", body.node, inner.node);
+            body.at.end = inner.at.end;
+        }
+        let point = self.value(node)?;
+        let clause = |c: &Node| Some((self.named(c.first(Kind::Keyword)?), self.value(c)?));
+        let clauses = node.all(Kind::Fitted).filter_map(clause).collect();
+        Some(Fitted { motor, body, point, clauses })
     }
 
     fn joint(&mut self, node: &Node) -> Option<Joint> {

@@ -98,6 +98,11 @@ pub enum Kind {
     Via,
     Load,
     Hole,
+    Mount,
+    Horn,
+    Plate,
+    /// A clause of a mount or a horn.
+    Fitted,
     Gravity,
     Moment,
     Force,

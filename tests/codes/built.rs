@@ -147,6 +147,38 @@ mechanism toggle {
 }
 ";
 
+/// A motor two of whose screws are under the arm that it turns.
+const SEATED: &str = "edition 1
+use std.materials.petg
+use std.processes.fdm
+use std.flexures.crossed_leaves
+use std.motors.xl330_m288
+mechanism nodder {
+    point O = (0 mm, 0 mm)
+    point D = (60 mm, 0 mm)
+    point A = (0 mm, 15 mm)
+    point B = (60 mm, 40 mm)
+    ground base    { O, D }  layer -2
+    link   arm     { O, A }  layer -1
+    link   coupler { A, B }
+    link   rocker  { B, D }
+    hinge motor: base to arm       at O  layer -1
+    hinge elbow: arm to coupler    at A  as crossed_leaves { size = 8 mm }
+    hinge knee:  coupler to rocker at B  as crossed_leaves { size = 8 mm }
+    hinge heel:  rocker to base    at D  into base toward D - (0 mm, 25 mm)  as crossed_leaves { size = 8 mm }
+    mount xl330_m288 on base at O
+    horn  xl330_m288 on arm  at O
+    material petg
+    print on fdm
+    cycle 4 steps over 2 s
+    drive motor from -5 deg to 5 deg with xl330_m288
+    trace tip = B on rocker
+    minimize { track(tip) }
+    require max(error(tip)) <= 1 mm
+    export stl
+}
+";
+
 type Find = fn() -> Vec<String>;
 
 /// Cases: code, and what finds all that there is.
@@ -171,7 +203,7 @@ pub fn cases() -> Vec<(&'static str, Find)> {
         ("E0641", lazy(|| at_start(&apart(0.0, "sharing base")))),
         ("W0642", lazy(|| at_start(&apart(4.7, "sharing base")))),
         ("W0644", lazy(|| at_start(WRIST))),
-        ("W0649", lazy(|| at_start(&WRIST.replace("export stl", "export dxf")))),
+        ("W0650", lazy(|| at_start(&WRIST.replace("export stl", "export dxf")))),
         (
             "W0645",
             lazy(|| {
@@ -180,6 +212,7 @@ pub fn cases() -> Vec<(&'static str, Find)> {
                 ))
             }),
         ),
+        ("W0649", lazy(|| at_start(SEATED))),
         ("E0710", lazy(|| all(&built(&short(&[]), None, |r| r.frozen = true)))),
         (
             "W0711",

@@ -208,6 +208,7 @@ fn statements_of_the_whole_language_are_known_by_their_keyword() {
                 format!("{} keys {:?} {continuous}", keys.len(), motor.as_ref().map(|m| m.node.as_str()))
             }
             StatementKind::Load(_) => "load".into(),
+            StatementKind::Mount(m) => format!("mount {} on {}", m.motor.node, m.body.node),
             StatementKind::Variant(variant) => {
                 let set: Vec<&str> = variant.settings.iter().map(|(path, _)| path.node.as_str()).collect();
                 format!("variant {} {set:?}", variant.name.node)
@@ -232,7 +233,7 @@ fn statements_of_the_whole_language_are_known_by_their_keyword() {
         [
             "place right half",
             "mirror left right yz [\"a\", \"b\"]",
-            "mount",
+            "mount xl320 on a",
             "string via 1",
             "variant ring [\"x\", \"knee.thickness\", \"y\"]",
             "assert message { not closed",

@@ -14,7 +14,7 @@
 //! ```
 
 use crate::diagnostic::{Diagnostic, Origin};
-use crate::ir::{Design, Solution};
+use crate::ir::{Design, LoadKind, ObjectiveKind, Solution};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -147,6 +147,16 @@ pub fn design_digest(design: &Design) -> String {
     };
     if let Value::Object(fields) = &mut value {
         fields.remove("exports");
+        // Motors and plates change the form of links; only weight and what keeps links apart ask for that.
+        let apart = design.all_objectives().any(|o| matches!(o.kind, ObjectiveKind::Collision { .. }));
+        let weighed = design.all_loads().any(|l| matches!(l.kind, LoadKind::Gravity { .. }));
+        if !apart && !weighed {
+            for body in fields.get_mut("bodies").and_then(Value::as_array_mut).into_iter().flatten() {
+                if let Value::Object(body) = body {
+                    body.remove("fittings");
+                }
+            }
+        }
         fields.remove("requirements");
         for case in fields.get_mut("cases").and_then(Value::as_array_mut).into_iter().flatten() {
             if let Value::Object(case) = case {

@@ -13,7 +13,7 @@ pub use way::Way;
 pub use wiring::{Motor, Wiring};
 
 use super::drawing::svg_drawing;
-use super::plate::Plate;
+use super::plate::{Bought, Plate};
 use super::scene::Scene;
 use super::sheet;
 use crate::diagnostic::Severity;
@@ -140,17 +140,6 @@ pub struct Finding {
     pub label: String,
     /// What to do.
     pub help: String,
-}
-
-/// Something that is bought.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Bought {
-    /// How many.
-    pub count: usize,
-    /// What.
-    pub name: String,
-    /// For what.
-    pub purpose: String,
 }
 
 impl Report<'_> {

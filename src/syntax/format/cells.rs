@@ -55,6 +55,11 @@ pub(super) fn column(node: &Node, at: usize, source: &str) -> Option<Column> {
             "at" => new(1, "hole"),
             _ => new(2, "hole"),
         },
+        (Kind::Mount | Kind::Horn, Kind::Ident) if at < 3 => new(0, "fitted"),
+        (Kind::Mount | Kind::Horn, Kind::Keyword) if at > 0 => match text {
+            "on" => new(1, "fitted"),
+            _ => new(2, "fitted"),
+        },
         (Kind::Load, Kind::Gravity | Kind::Moment | Kind::Force) => new(0, "drive"),
         (Kind::Drive, Kind::Range | Kind::By | Kind::Keys) => new(1, "drive"),
         (Kind::Rest, Kind::Keyword) if at > 0 => new(1, "drive"),
