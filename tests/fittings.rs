@@ -200,7 +200,7 @@ fn screws_of_face_and_horn_lie_on_their_patterns() {
 #[test]
 fn a_stepper_is_screwed_to_a_ring_round_its_pilot() {
     let none = part(&nodder("nema17", ""));
-    let mesh = part(&nodder("nema17", "mount nema17 on base at O"));
+    let mesh = part(&nodder("nema17", "mount nema17 on base at O toward D"));
     // Four screws; ring and frame leave no windows between them.
     assert_eq!(tunnels(&mesh), tunnels(&none) + 4);
     for (x, y) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {

@@ -7,8 +7,9 @@ use std::collections::BTreeMap;
 const LEVEL_MM: f64 = 1e-6;
 /// Faces of a level are at least this large together, mm²: rounded rims leave slivers.
 const LEAST_FACE_MM2: f64 = 1.0;
-/// Levels nearer to each other than this have no section between them, mm: no machine cuts such a plate.
-const LEAST_BAND_MM: f64 = 0.01;
+/// What lies between levels nearer to each other than this is rims, and steps between a link and its stubs, mm: it goes half to the band below
+/// and half to that above, or all to the only one.
+const LEAST_BAND_MM: f64 = 0.5;
 /// A point this near to the line of its neighbours says nothing, mm.
 const STRAIGHT_MM: f64 = 1e-6;
 
@@ -47,12 +48,27 @@ pub fn bands(mesh: &Mesh) -> Vec<Band> {
         let uneven = off(0.25).max(off(0.75));
         Band { z_mm: [w[0], w[1]], outlines, uneven }
     };
-    levels
-        .windows(2)
-        .filter(|w| w[1] - w[0] >= LEAST_BAND_MM)
-        .map(between)
-        .filter(|b| !b.outlines.is_empty())
-        .collect()
+    let thick = levels.windows(2).filter(|w| w[1] - w[0] >= LEAST_BAND_MM);
+    let mut bands: Vec<Band> = thick.map(between).filter(|b| !b.outlines.is_empty()).collect();
+    let small = |gap: f64| gap < 2.0 * LEAST_BAND_MM;
+    for i in 1..bands.len() {
+        let (below, above) = (bands[i - 1].z_mm[1], bands[i].z_mm[0]);
+        if small(above - below) {
+            let middle = (below + above) / 2.0;
+            (bands[i - 1].z_mm[1], bands[i].z_mm[0]) = (middle, middle);
+        }
+    }
+    if let (Some(first), Some(lowest)) = (bands.first_mut(), levels.first())
+        && small(first.z_mm[0] - lowest)
+    {
+        first.z_mm[0] = *lowest;
+    }
+    if let (Some(last), Some(highest)) = (bands.last_mut(), levels.last())
+        && small(highest - last.z_mm[1])
+    {
+        last.z_mm[1] = *highest;
+    }
+    bands
 }
 
 /// Outlines of a closed, oriented mesh at a height, mm. Corners at that very height count as above it.

@@ -558,13 +558,19 @@ pub(super) fn judge(design: &Design, layout: &Layout, cycle: &Cycle) -> Vec<Diag
                 .help("thicken or shorten the flexures that work in compression"),
         );
     }
-    if let (true, Some(first), Some(last)) = (layout.closed, cycle.states.first(), cycle.states.last()) {
-        if apart_mm(layout, &first.state, &last.state) > SAME_MM {
-            found.push(
-                Diagnostic::warning("W0604", "after a whole cycle the mechanism is not where it began", design.origin)
-                    .help("it snaps from one equilibrium to another on the way: see the energy in `flexura simulate`"),
-            );
-        }
+    if let (true, Some(first), Some(last)) = (layout.closed, cycle.states.first(), cycle.states.last())
+        && apart_mm(layout, &first.state, &last.state) > SAME_MM
+    {
+        found.push(
+            Diagnostic::warning(
+                "W0604",
+                "after a whole cycle the mechanism is not where it began",
+                design.origin,
+            )
+            .help(
+                "it snaps from one equilibrium to another on the way: see the energy in `flexura simulate`",
+            ),
+        );
     }
     found
 }

@@ -7,8 +7,8 @@
   "rest" "at" "trace" "minimize" "weight" "require" "export" "rod" "along" "section" "keys" "linear" "smooth" "and"
   "output" "target" "about" "direction" "axis" "layer" "pin" "into" "toward" "as" "free" "body" "first" "second"
   "place" "turned" "scale" "merging" "mirror" "across" "sharing" "load" "gravity" "hole" "moment" "workspace" "allow"
-  "string" "via" "assert" "variant" "for" "case"
-  "fatigue" "horn" "mount" "plate" "solid" "spring" "stop" "sweep" "tolerance"
+  "string" "via" "assert" "variant" "for" "case" "mount" "horn" "plate" "thick" "clearance" "deep" "margin"
+  "fatigue" "solid" "spring" "stop" "sweep" "tolerance"
 ] @keyword
 (cycle "in" @keyword)
 (for "in" @keyword)
@@ -22,6 +22,8 @@
 (template name: (identifier) @type)
 (place mechanism: (identifier) @type)
 (drive motor: (identifier) @type)
+(mount motor: (identifier) @type)
+(horn motor: (identifier) @type)
 (material (identifier) @type)
 (print (identifier) @type)
 (dimension) @type
