@@ -112,6 +112,13 @@ pub fn section(mesh: &Mesh, z_mm: f64) -> Vec<Vec<[f64; 2]>> {
 
 /// An outline without the points at which it does not turn.
 fn corners(outline: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let near = |p: &[f64; 2], q: &[f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]) <= STRAIGHT_MM;
+    // A cut through a corner of the mesh gives one point several times.
+    let mut outline = outline.to_vec();
+    outline.dedup_by(|p, q| near(p, q));
+    while outline.len() > 1 && near(&outline[0], &outline[outline.len() - 1]) {
+        outline.pop();
+    }
     let mut kept: Vec<[f64; 2]> = Vec::with_capacity(outline.len());
     let n = outline.len();
     for (i, p) in outline.iter().enumerate() {
@@ -134,4 +141,36 @@ pub fn area_mm2(outlines: &[Vec<[f64; 2]>]) -> f64 {
         o.iter().zip(following).map(|(p, q)| 0.5 * (p[0] * q[1] - p[1] * q[0])).sum()
     };
     outlines.iter().map(one).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    /// A square tower of two storeys, cut at every height: through facets, through corners half-way up, and where it begins.
+    #[test]
+    fn a_cut_through_corners_is_the_same_outline() {
+        let mut mesh = Mesh::default();
+        for z in [0.0, 5.0, 10.0] {
+            for (x, y) in [(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)] {
+                mesh.vertices.push(Vector3::new(x, y, z));
+            }
+        }
+        mesh.triangles.extend([[0, 2, 1], [0, 3, 2], [8, 9, 10], [8, 10, 11]]);
+        for storey in [0, 4] {
+            for k in 0..4 {
+                let (a, b) = (storey + k, storey + (k + 1) % 4);
+                mesh.triangles.extend([[a, b, b + 4], [a, b + 4, a + 4]]);
+            }
+        }
+        for z in [1e-3, 2.0, 5.0, 5.0 + 1e-9, 7.0] {
+            let outlines = section(&mesh, z);
+            assert_eq!(outlines.iter().map(Vec::len).collect::<Vec<_>>(), [4], "at {z}: {outlines:?}");
+            assert!((area_mm2(&outlines) - 12.0).abs() < 1e-6, "at {z}");
+        }
+        let bands = bands(&mesh);
+        assert_eq!(bands.len(), 1);
+        assert!(bands[0].z_mm == [0.0, 10.0] && bands[0].uneven < 1e-9, "{bands:?}");
+    }
 }
