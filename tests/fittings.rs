@@ -134,7 +134,7 @@ fn a_servo_with_flanges_goes_through_a_window_and_its_screws_reach() {
     assert!(near(ROUNDING_MM) > 0);
     // The shaft of 4.7 mm goes through the arm.
     let bore = clear_radius(&mesh, [0.0, 0.0], [-PITCH_MM - HALF_MM, -PITCH_MM + HALF_MM]);
-    assert!(bore >= 2.35 - ROUNDING_MM && bore < 2.4, "{bore}");
+    assert!((2.35 - ROUNDING_MM..2.4).contains(&bore), "{bore}");
 }
 
 #[test]
@@ -166,7 +166,7 @@ fn a_servo_without_screws_rests_on_a_lip() {
     // A horn of 20 mm lies in a recess 1 mm deep in the arm's lower face.
     let face = -PITCH_MM - HALF_MM;
     let recess = clear_radius(&mesh, [0.0, 0.0], [face - 0.1, face + 0.9]);
-    assert!(recess >= 10.5 - ROUNDING_MM && recess < 10.6, "{recess}");
+    assert!((10.5 - ROUNDING_MM..10.6).contains(&recess), "{recess}");
 }
 
 #[test]
@@ -205,11 +205,11 @@ fn a_stepper_is_screwed_to_a_ring_round_its_pilot() {
     assert_eq!(tunnels(&mesh), tunnels(&none) + 4);
     for (x, y) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
         let clear = clear_radius(&mesh, [15.5 * x, 15.5 * y], [BEHIND_MM - 0.5, BEHIND_MM + 3.5]);
-        assert!(clear >= 1.75 - ROUNDING_MM && clear < 1.78, "{clear}");
+        assert!((1.75 - ROUNDING_MM..1.78).contains(&clear), "{clear}");
     }
     let pilot = mesh.vertices.iter().filter(|p| p.z < BEHIND_MM + 2.4).map(|p| p.x.hypot(p.y));
     let pilot = pilot.fold(f64::INFINITY, f64::min);
-    assert!(pilot >= 11.5 - ROUNDING_MM && pilot < 11.6, "{pilot}");
+    assert!((11.5 - ROUNDING_MM..11.6).contains(&pilot), "{pilot}");
     let shaft = clear_radius(&mesh, [0.0, 0.0], [BEHIND_MM, BEHIND_MM + 2.0 * HALF_MM]);
     assert!(shaft >= 2.5, "{shaft}");
 }
