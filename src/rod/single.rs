@@ -3,7 +3,7 @@
 
 use super::{FactorReport, RetractError, Rod, RodForces, RodState, RodSystem};
 use crate::math::Pose;
-use nalgebra::{Const, LU, Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use std::fmt;
 
 /// Most iterations of one solve.
@@ -12,9 +12,6 @@ const MAX_ITERATIONS: usize = 100;
 const RELATIVE_RESIDUAL: f64 = 1e-9;
 /// Smallest force scale, in units of EI/L².
 const LEAST_FORCE: f64 = 1e-3;
-/// A step with the former factors leaves about 2 r₁²/r₀ of residuals r₀ and r₁ before and after the full step they served; it is
-/// taken where that is below this part of the tolerance.
-const CHORD: f64 = 0.1;
 /// Longest turn of link B in one iteration, rad.
 const MAX_TURN: f64 = 0.5;
 
@@ -127,8 +124,8 @@ impl SingleRod {
         self.system.assemble(&self.rod, &self.state, &self.pose_a, &self.pose_b);
     }
 
-    /// Applies increments of B and the matching internal ones, halved until the rod follows; by which part.
-    fn advance(&mut self, d: &SVector<f64, 12>, whole: bool) -> Result<f64, SingleError> {
+    /// Applies increments of B and the matching internal ones, halved until the rod follows.
+    fn advance(&mut self, d: &SVector<f64, 12>, whole: bool) -> Result<(), SingleError> {
         let turn = d.fixed_rows::<3>(9).norm();
         let mut scale = if whole { 1.0 } else { (MAX_TURN / turn.max(f64::MIN_POSITIVE)).min(1.0) };
         let internal = self.system.back_substitute(d).to_vec();
@@ -141,11 +138,11 @@ impl SingleRod {
             if outcome.is_ok() {
                 self.system.expect(&self.rod, scale);
                 self.pose_b = b;
-                return Ok(scale);
+                return Ok(());
             }
             scale *= 0.5;
         }
-        outcome.map(|()| scale).map_err(SingleError::Step)
+        outcome.map_err(SingleError::Step)
     }
 
     /// Moves link B by an increment, with the rod following as predicted by its tangents here and, of a movement that
@@ -202,8 +199,6 @@ impl SingleRod {
         self.solved = false;
         let length = self.rod.length_mm();
         let least = LEAST_FORCE * self.rod.least_bending_stiffness() / (length * length);
-        // Residual before a full step, and the factors it was made with.
-        let mut before: Option<(f64, LU<f64, Const<6>, Const<6>>)> = None;
         for iteration in 0..MAX_ITERATIONS {
             self.assemble();
             let (lg, lh) = load.derivatives(&self.pose_b);
@@ -227,30 +222,21 @@ impl SingleRod {
                 self.solved = true;
                 return Ok(iteration);
             }
-            let held = |i: &usize| !free[*i];
-            let near = |(r, _): &(f64, _)| 2.0 * residual * residual / r <= CHORD * tolerance;
-            let chord = before.take().filter(near);
-            let again = chord.is_some();
-            let (mut g6, factors) = match chord {
-                Some((_, factors)) => (self.system.condense_gradient().fixed_rows::<6>(6) + lg, factors),
-                None => {
-                    self.system.factor();
-                    let (g, h) = self.system.condense_end();
-                    let mut h6 = h + lh;
-                    for i in (0..6).filter(held) {
-                        h6.row_mut(i).fill(0.0);
-                        h6.column_mut(i).fill(0.0);
-                        h6[(i, i)] = 1.0;
-                    }
-                    (g + lg, h6.lu())
+            self.system.factor();
+            let (g, h) = self.system.condense_end();
+            let (mut g6, mut h6) = (g + lg, h + lh);
+            for (i, free) in free.into_iter().enumerate() {
+                if !free {
+                    g6[i] = 0.0;
+                    h6.row_mut(i).fill(0.0);
+                    h6.column_mut(i).fill(0.0);
+                    h6[(i, i)] = 1.0;
                 }
-            };
-            (0..6).filter(held).for_each(|i| g6[i] = 0.0);
-            let step = factors.solve(&-g6).ok_or(SingleError::Singular)?;
+            }
+            let step = h6.lu().solve(&-g6).ok_or(SingleError::Singular)?;
             let mut d = SVector::<f64, 12>::zeros();
             d.fixed_rows_mut::<6>(6).copy_from(&step);
-            let taken = self.advance(&d, false)?;
-            before = (!again && taken >= 1.0).then_some((residual, factors));
+            self.advance(&d, false)?;
         }
         Err(SingleError::NotConverged { residual })
     }
