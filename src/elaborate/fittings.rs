@@ -57,11 +57,7 @@ impl<'a> Evaluator<'a> {
     ) -> Outcome<(usize, Mount)> {
         let motor = self.record_named(module, &text.motor, "motor");
         let motor = motor.and_then(|item| self.motor_body(item, &text.motor));
-        let place = self.fitted_place(scope, text, s);
-        let mut given = Given::default();
-        let clauses = self.clauses(scope, text, &mut given);
-        let (motor, (body, position)) = (motor?, place?);
-        clauses?;
+        let (motor, body, position, given) = self.fitted(scope, text, s, motor)?;
         let joint = self.turned_at(body, position, s);
         let Given { along, toward, clearance_mm, thick: thick_mm, .. } = given;
         if let Some(q) = toward {
@@ -92,11 +88,7 @@ impl<'a> Evaluator<'a> {
     ) -> Outcome<(usize, Horn)> {
         let form = self.record_named(module, &text.motor, "motor");
         let form = form.and_then(|item| self.horn_form(item, &text.motor));
-        let place = self.fitted_place(scope, text, s);
-        let mut given = Given::default();
-        let clauses = self.clauses(scope, text, &mut given);
-        let (form, (body, position)) = (form?, place?);
-        clauses?;
+        let (form, body, position, given) = self.fitted(scope, text, s, form)?;
         let Some(joint) = self.turned_at(body, position, s) else {
             let message = format!("`{}` has no ordinary hinge here that a motor could turn", text.body.node);
             return self.fail(
@@ -122,15 +114,22 @@ impl<'a> Evaluator<'a> {
         Ok((body?, LinkPlate { thick_mm: thick?, margin_mm, origin: at }))
     }
 
-    fn fitted_place(
+    /// What a mount and a horn have in common, besides what is known of the motor: body, point, clauses. All of it is looked at before any
+    /// of it fails.
+    fn fitted<T>(
         &mut self,
         scope: usize,
         text: &'a ast::Fitted,
         s: &Structure<'a>,
-    ) -> Outcome<(usize, ExprPoint)> {
+        motor: Outcome<T>,
+    ) -> Outcome<(T, usize, ExprPoint, Given)> {
         let body = self.thing(scope, &s.body_index, &text.body, "body");
         let point = self.eval(&Env::fixed(scope), &text.point).and_then(|v| self.as_point(v, &text.point));
-        Ok((body?, point?))
+        let mut given = Given::default();
+        let clauses = self.clauses(scope, text, &mut given);
+        let (motor, body, point) = (motor?, body?, point?);
+        clauses?;
+        Ok((motor, body, point, given))
     }
 
     /// What is screwed on does not grow with the drawing.

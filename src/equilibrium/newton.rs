@@ -26,9 +26,9 @@ const ROTATION_STEP_RAD: f64 = 0.4;
 /// Largest displacement of a link in one iteration, in lever lengths.
 const TRANSLATION_STEP: f64 = 0.5;
 
-/// After a full step the Hessian is that of a state so near that a step with its factors, at a fifth of the cost of new ones, leaves about
-/// 2 r₁²/r₀ of residuals r₀ and r₁ before and after it. It is taken where that is below this part of the tolerance: 0.01, 0.1 and 0.5 take the
-/// same iterations in the cycles of all examples.
+/// After a full step the Hessian is that of a state so near that a step with its factors leaves about 2 r₁²/r₀ of residuals r₀ and r₁ before and
+/// after it. It is taken where that is below this part of the tolerance. Over the cycles of the examples, at start and solved, 0.01, 0.1 and 0.5 replace
+/// 5 to 43, 10 to 46 and 12 to 48 % of the factorisations of steps, and take the same number of steps in all, but for one.
 const CHORD: f64 = 0.1;
 
 /// Why no equilibrium was found.

@@ -16,8 +16,8 @@ const ORDER: usize = 4;
 /// Cycles of fewer states are followed one way: there is nothing to share.
 const LEAST_STATES: usize = 4;
 
-/// States that were reached on two ways are the same where no body and no rod is further apart than this, mm (rotations: rad). Two ways leave
-/// 1e-13 to 1e-9 in the examples, another equilibrium is millimetres away.
+/// States that were reached on two ways are the same where no body and no rod is further apart than this, mm (rotations: rad). The two ways round
+/// leave 2e-13 to 9e-10 in the examples.
 pub const SAME_MM: f64 = 1e-6;
 
 /// Equilibria of all states 0..=N.

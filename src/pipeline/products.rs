@@ -15,8 +15,9 @@ use crate::emit::scene::Scene;
 use crate::emit::sheet::print_sheet;
 use crate::emit::stl::stl_bytes;
 use crate::emit::threemf::threemf_bytes;
-use crate::geometry::bands;
+use crate::geometry::{Band, bands};
 use crate::ir::{Assembly, ExportKind};
+use rayon::prelude::*;
 use std::cell::OnceCell;
 
 /// Pixels of a picture, and of the thumbnail in an archive of parts.
@@ -41,16 +42,18 @@ type Written = Result<Artefact, (&'static str, &'static str, String)>;
 /// Every export of parts that is asked for, in the order of the text, each kind once; and what is to say of them.
 pub fn artefacts(built: &Built<'_>) -> Parts {
     let Built { assembly, solids, moving, printed } = *built;
-    let (shown, laid) = (OnceCell::new(), OnceCell::new());
+    let (shown, laid, cut) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
     let scene = || shown.get_or_init(|| scene(assembly, moving, solids, printed));
     let plate = || laid.get_or_init(|| lay::plate(assembly, moving, printed));
+    let sections =
+        || cut.get_or_init(|| plate().parts.par_iter().map(|p| bands(&p.mesh)).collect::<Vec<_>>());
     let (mut out, mut found) = (Vec::new(), Vec::new());
     for (k, placed) in assembly.exports.iter().enumerate() {
         let kind = &placed.export.kind;
         if assembly.exports.iter().take(k).any(|e| e.export.kind == *kind) {
             continue;
         }
-        for written in files(&assembly.name, kind, printed, &scene, &plate) {
+        for written in files(&assembly.name, kind, printed, &scene, &plate, &sections) {
             match written {
                 Ok(artefact) => out.push(artefact),
                 Err((code, what, why)) => {
@@ -78,8 +81,8 @@ pub fn artefacts(built: &Built<'_>) -> Parts {
     let shown = reported.then(|| (scene().clone(), plate().clone()));
     if let Some(plate) = laid.get() {
         found.extend(lay::findings(assembly, plate, printed));
-        if let Some(cut) = assembly.exports.iter().find(|e| e.export.kind == ExportKind::Dxf) {
-            found.extend(lay::uneven(plate, cut.export.origin));
+        if let Some(drawn) = assembly.exports.iter().find(|e| e.export.kind == ExportKind::Dxf) {
+            found.extend(lay::uneven(plate, sections(), drawn.export.origin));
         }
     }
     Parts { artefacts: out, diagnostics: found, shown }
@@ -91,6 +94,7 @@ fn files<'s>(
     printed: &[Printed],
     scene: &dyn Fn() -> &'s Scene,
     plate: &dyn Fn() -> &'s Plate,
+    sections: &dyn Fn() -> &'s Vec<Vec<Band>>,
 ) -> Vec<Written> {
     let file = |name: String, bytes: Result<Vec<u8>, String>, code: &'static str, what: &'static str| {
         bytes.map(|bytes| Artefact { name, bytes }).map_err(|why| (code, what, why))
@@ -116,11 +120,10 @@ fn files<'s>(
             vec![file(format!("{name}.print.md"), bytes, "E0646", "print sheet")]
         }
         ExportKind::Dxf => {
-            let drawn = |p: &Laid| {
-                let bytes = dxf_bytes(&bands(&p.mesh));
-                file(format!("{}.dxf", p.name), bytes, "E0647", "DXF")
+            let drawn = |(p, bands): (&Laid, &Vec<Band>)| {
+                file(format!("{}.dxf", p.name), dxf_bytes(bands), "E0647", "DXF")
             };
-            plate().parts.iter().map(drawn).collect()
+            plate().parts.iter().zip(sections()).map(drawn).collect()
         }
         ExportKind::Png => vec![file(format!("{name}.png"), picture(PICTURE), "E0647", "picture")],
         ExportKind::Svg => {
