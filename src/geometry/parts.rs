@@ -12,7 +12,7 @@ use super::gap::{Fusion, fusions};
 use super::link::{BodyPlan, plan_body};
 use super::mesh::Mesh;
 use super::slot::Facets;
-use super::tidy::{SHORT_EDGE_MM, without_short_edges};
+use super::tidy::finished;
 use super::union::{BooleanError, subtract_all, union_all};
 use crate::math::Pose;
 use crate::rod::SectionShape;
@@ -334,7 +334,7 @@ pub(super) fn build_part(
     let links = solids.clone();
     solids.extend(input.flexures.iter().filter(inside).map(|f| f.mesh(input.facets.around)));
     let united = union_all(&solids).map_err(failed)?;
-    let mesh = without_short_edges(&united, SHORT_EDGE_MM).rounded_to_f32().sorted();
+    let mesh = finished(&united);
     let notes = bodies.iter().flat_map(|i| plans[*i].notes.iter().cloned()).collect();
     Ok(Part { name, bodies: bodies.to_vec(), mesh, links, notes })
 }
