@@ -483,3 +483,35 @@ fn short_hinge_agrees_with_shooting() {
     }
     assert_eq!(angle, 60);
 }
+
+/// In one go or in small steps a rod comes to the same place, fine ones too: there the residual alone says little. Measured: at most 2e-8 mm apart,
+/// in at most 7 iterations.
+#[test]
+fn one_large_step_ends_where_small_ones_do() {
+    const SAME_MM: f64 = 1e-7;
+    let load = |alpha: f64| {
+        let force = Vector3::y() * alpha * stiffness().ei1 / (L * L);
+        EndLoad { force, point: Vector3::x() * L, ..EndLoad::NONE }
+    };
+    for edges in [20, 100, 1000] {
+        let straight = || {
+            let rod = Rod::new(&benchmark(), MATERIAL, edges).unwrap();
+            SingleRod::new(rod, Vector3::zeros(), Vector3::x() * L)
+        };
+        let mut slow = straight();
+        let mut alpha = 0.0;
+        for target in [1.0, 3.0, 5.0, 10.0, 20.0] {
+            while alpha < target {
+                alpha = (alpha + 0.25_f64).min(target);
+                slow.solve(&load(alpha), [true; 6]).unwrap();
+            }
+            let mut fast = straight();
+            let iterations = fast.solve(&load(target), [true; 6]).unwrap();
+            let tip = |s: &SingleRod| s.pose_b.point(&(Vector3::x() * L));
+            let apart = (tip(&fast) - tip(&slow)).norm();
+            println!("{edges} edges, α = {target}: {iterations} iterations, {apart:.1e} mm");
+            assert!(iterations <= 8, "{edges} edges, α = {target}: {iterations} iterations");
+            assert!(apart < SAME_MM, "{edges} edges, α = {target}: {apart:e} mm");
+        }
+    }
+}
