@@ -171,6 +171,7 @@ impl<'a> Evaluator<'a> {
                 StatementKind::Mount(_) => "mount",
                 StatementKind::Horn(_) => "horn",
                 StatementKind::Plate(_) => "plate",
+                StatementKind::Solid(_) => "solid",
                 StatementKind::Output { .. } => "output",
                 StatementKind::Target { .. } => "target",
                 StatementKind::Workspace(_) => "workspace",

@@ -42,6 +42,8 @@ mod scaling;
 mod scope;
 mod settings;
 mod sheet;
+mod solids;
+mod stl;
 mod strings;
 mod structure;
 mod table;
@@ -63,6 +65,8 @@ pub use known::{KnownValue, quantity};
 pub use load::{std_modules, std_source, std_text};
 use settings::Settings;
 use std::fmt;
+use std::sync::Arc;
+pub use stl::{MOST_BYTES as MOST_SOLID_BYTES, SolidFile, StlFault};
 
 /// Why a file could not be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -99,6 +103,15 @@ pub trait Files {
     /// # Errors
     /// Why it could not be read.
     fn read(&self, path: &str) -> Result<String, FileError>;
+
+    /// The file of a solid, by the same rules; it need not be text. Who can should keep it while it is the same: it is asked for
+    /// whenever a text is understood anew.
+    ///
+    /// # Errors
+    /// Why it could not be read.
+    fn solid(&self, path: &str) -> Result<Arc<SolidFile>, FileError> {
+        self.read(path).map(|text| Arc::new(SolidFile::new(text.into_bytes())))
+    }
 }
 
 /// Files held in memory: pairs of path and text.

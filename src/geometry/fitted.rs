@@ -71,7 +71,7 @@ pub struct PlateSolid {
 /// What is wrong with a seat.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitFault {
-    /// Name of the motor.
+    /// Name of the motor, or the file of a solid.
     pub motor: String,
     /// What.
     pub kind: FitFaultKind,
@@ -92,6 +92,12 @@ pub enum FitFaultKind {
     NoReach(usize),
     /// A plate of a body without layers.
     NoLayer,
+    /// A solid this far from the rest of its link, mm.
+    Loose(f64),
+    /// A part with a solid falls apart into so many pieces.
+    Pieces(usize),
+    /// A part with a solid crosses itself in so many places, or is not closed.
+    Unsound(usize),
 }
 
 /// A box that is cut out.
@@ -117,6 +123,13 @@ impl Pocket {
         let triangles = faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]);
         let triangles = triangles.map(|[a, b, c]| if turned { [a, c, b] } else { [a, b, c] }).collect();
         Mesh { vertices: (0..8).map(corner).collect(), triangles }
+    }
+
+    /// The upright box round a mesh; none round an empty one.
+    pub(super) fn round(mesh: &Mesh) -> Option<Pocket> {
+        let (low, high) = mesh.bounding_box()?;
+        let edges = [Vector3::x(), Vector3::y(), Vector3::z()];
+        Some(Pocket { center: (low + high) / 2.0, edges, half_mm: ((high - low) / 2.0).into() })
     }
 
     /// The pocket in another place.

@@ -255,6 +255,7 @@ impl Placed<'_> {
             bores: plan.bores.iter().map(bore).collect(),
             plates: plan.plates.iter().map(|k| k.placed(p)).collect(),
             access: Vec::new(),
+            solids: plan.solids.iter().map(|s| s.placed(p)).collect(),
             pockets: plan.pockets.iter().map(|k| k.placed(p)).collect(),
             carried: plan.carried.iter().map(|s| s.placed(p)).collect(),
             // Told of the design that they belong to.
@@ -340,6 +341,8 @@ fn united(plans: Vec<(BodyPlan, usize)>) -> BodyPlan {
                 && (a.diameter_mm - b.diameter_mm).abs() < SAME_MM
         };
         out.bores.extend(plan.bores.into_iter().filter(|b| !known.iter().any(|k| is(k, b))));
+        let known = out.solids.clone();
+        out.solids.extend(plan.solids.into_iter().filter(|s| !known.iter().any(|k| k.is(s, SAME_MM))));
         let known = out.pockets.clone();
         out.pockets.extend(plan.pockets.into_iter().filter(|p| !known.iter().any(|k| k.is(p, SAME_MM))));
         let known = out.carried.clone();

@@ -6,12 +6,14 @@
 //! keep the layers apart, so nothing has to be glued. A motor's shaft passes the whole joint.
 
 use super::carve::{Carving, carve};
+use super::check::check_mesh;
 use super::cycle::MovedState;
-use super::fitted::{FitFault, MountSolid, PlateSolid, SeatSolid, out_of_reach};
+use super::fitted::{FitFault, FitFaultKind, MountSolid, PlateSolid, SeatSolid, out_of_reach};
 use super::gap::{Fusion, fusions};
 use super::link::{BodyPlan, plan_body};
 use super::mesh::Mesh;
 use super::slot::Facets;
+use super::solid::PlacedSolid;
 use super::tidy::{SHORT_EDGE_MM, without_short_edges};
 use super::union::{BooleanError, subtract_all, union_all};
 use crate::math::Pose;
@@ -67,6 +69,8 @@ pub struct BodySolid {
     pub mounts: Vec<MountSolid>,
     /// It is a plate.
     pub plate: Option<PlateSolid>,
+    /// Meshes from files that are part of it.
+    pub solids: Vec<PlacedSolid>,
     /// Seats of motors' horns.
     pub seats: Vec<SeatSolid>,
     /// A body that a flexure's template brings along.
@@ -194,7 +198,7 @@ pub struct Parts {
     pub carving: Carving,
     /// Places where things grow together that must not.
     pub fusions: Vec<Fusion>,
-    /// Motors whose screws no driver reaches.
+    /// Motors whose screws no driver reaches, solids that do not hold on to their links.
     pub out_of_reach: Vec<FitFault>,
 }
 
@@ -269,7 +273,11 @@ fn build_planned(
 ) -> Result<Parts, GeometryError> {
     let groups = groups(input);
     let fusions = fusions(input, &plans, &groups, &carving);
-    let out_of_reach = out_of_reach(&plans, &groups);
+    let mut out_of_reach = out_of_reach(&plans, &groups);
+    for (solid, gap, at) in plans.iter().flat_map(BodyPlan::loose_solids) {
+        let (motor, kind) = (solid.file.clone(), FitFaultKind::Loose(gap));
+        out_of_reach.push(FitFault { motor, kind, at, origin: solid.origin });
+    }
     let build = |bodies: &Vec<usize>| {
         if wanted(bodies) {
             return build_part(input, &plans, &carving, bodies);
@@ -279,6 +287,25 @@ fn build_planned(
         Ok(Part { name, bodies: bodies.clone(), mesh: Mesh::default(), links: Vec::new(), notes })
     };
     let parts = groups.par_iter().map(build).collect::<Result<Vec<Part>, GeometryError>>()?;
+    // Nobody vouches for the surface of a solid, so what came of it is looked at.
+    for part in parts.iter().filter(|p| !p.mesh.triangles.is_empty()) {
+        let mut solids = part.bodies.iter().filter_map(|b| plans.get(*b)).flat_map(|p| &p.solids);
+        let Some(first) = solids.next() else { continue };
+        let facts = check_mesh(&part.mesh);
+        if !facts.is_sound() {
+            let kind = FitFaultKind::Unsound(facts.self_intersections);
+            let at = facts.examples.first().map_or(first.shift, |(t, _)| part.mesh.corners(*t)[0]);
+            out_of_reach.push(FitFault { motor: first.file.clone(), kind, at, origin: first.origin });
+        } else if facts.components > 1 {
+            let kind = FitFaultKind::Pieces(facts.components);
+            out_of_reach.push(FitFault {
+                motor: first.file.clone(),
+                kind,
+                at: first.shift,
+                origin: first.origin,
+            });
+        }
+    }
     Ok(Parts { parts, plans, carving, fusions, out_of_reach })
 }
 

@@ -41,7 +41,7 @@ pub use stability::{DriveValues, LimitPoint, RestState, SnapThrough, Stability};
 pub use stages::{Between, Checked, Failed, Made, NothingMade, Parts, Response, Simulation, Solved, Stages};
 
 use crate::diagnostic::{Diagnostic, Severity};
-pub use crate::elaborate::{FileError, Files};
+pub use crate::elaborate::{FileError, Files, MOST_SOLID_BYTES, SolidFile};
 use crate::emit::lock::{Lock, LockState};
 use crate::ir::{Assembly, Design, Solution};
 use crate::lint::{Levels, Stage as Reached};

@@ -1,7 +1,7 @@
 //! Statements: concrete tree to [`ast::StatementKind`].
 
 use super::ast::{
-    Allow, At, Cable, Compare, Expr, Fitted, Hole, Ident, Joint, Load, Plate, Profile, Rod, RodEnd,
+    Allow, At, Cable, Compare, Expr, Fitted, Hole, Ident, Joint, Load, Plate, Profile, Rod, RodEnd, Solid,
     Statement, StatementKind, TemplateUse, Term,
 };
 use super::lower::Lower;
@@ -99,6 +99,7 @@ impl Lower<'_> {
                 let (thickness, body) = (values.next()?, self.ident(node)?);
                 StatementKind::Plate(Box::new(Plate { thickness, body, margin: values.next() }))
             }
+            Kind::Solid => StatementKind::Solid(Box::new(self.solid(node)?)),
             Kind::Allow => StatementKind::Allow(self.allow(node)?),
             Kind::Assert => StatementKind::Assert(Box::new(self.assertion(node)?)),
             Kind::Variant => StatementKind::Variant(Box::new(self.variant(node)?)),
@@ -124,6 +125,33 @@ impl Lower<'_> {
         let clause = |c: &Node| Some((self.named(c.first(Kind::Keyword)?), self.value(c)?));
         let clauses = node.all(Kind::Fitted).filter_map(clause).collect();
         Some(Fitted { motor, body, point, clauses })
+    }
+
+    fn solid(&mut self, node: &Node) -> Option<Solid> {
+        let text = node.first(Kind::Text)?;
+        let file = At { node: self.quoted(text), at: self.origin(text) };
+        let body = self.ident(node)?;
+        let mut solid = Solid { file, body, point: None, turned: Vec::new(), scale: None };
+        let mut seen: Vec<(Kind, Origin)> = Vec::new();
+        for clause in node.parts() {
+            let kind = clause.kind;
+            let once = matches!(kind, Kind::At | Kind::Scaled);
+            if let Some((_, first)) = seen.iter().find(|(k, _)| once && *k == kind).copied() {
+                self.twice(clause, first);
+                continue;
+            }
+            seen.push((kind, self.origin(clause)));
+            match kind {
+                Kind::At => solid.point = self.value(clause),
+                Kind::Turned => {
+                    let mut values = self.values(clause).into_iter();
+                    solid.turned.extend(values.next().zip(values.next()));
+                }
+                Kind::Scaled => solid.scale = self.value(clause),
+                _ => {}
+            }
+        }
+        Some(solid)
     }
 
     fn joint(&mut self, node: &Node) -> Option<Joint> {
