@@ -32,6 +32,7 @@ mod members;
 mod mirroring;
 mod motor_form;
 mod names;
+mod own_fittings;
 mod places;
 mod placing;
 mod profiles;

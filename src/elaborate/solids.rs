@@ -35,7 +35,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    fn solid(
+    pub(super) fn solid(
         &mut self,
         scope: usize,
         text: &'a ast::Solid,

@@ -111,6 +111,34 @@ pub struct Pocket {
     pub half_mm: [f64; 3],
 }
 
+impl MountSolid {
+    /// A motor on a body that stands still and has no layers, its shaft in no joint: at `point` (mm), with the rest of the body
+    /// round `rest`, between links of a height, where the process keeps `clearance_mm`.
+    pub fn standing(
+        mount: &Mount,
+        point: Vector3<f64>,
+        toward: Option<Vector3<f64>>,
+        rest: Vector3<f64>,
+        [height_mm, clearance_mm]: [f64; 2],
+    ) -> Self {
+        let axis = mount.along.map_or_else(Vector3::z, Vector3::from);
+        let off = toward.unwrap_or(rest) - point;
+        let flat = (off - axis * off.dot(&axis)).try_normalize(SAME_POINT_MM);
+        Self {
+            motor: mount.motor.clone(),
+            point,
+            axis,
+            forward: flat.unwrap_or_else(|| any_normal(&axis)),
+            rest,
+            bears: false,
+            passes: false,
+            thick_mm: mount.thickness_mm(height_mm),
+            clearance_mm: mount.clearance_mm.unwrap_or(clearance_mm),
+            origin: mount.origin,
+        }
+    }
+}
+
 impl Pocket {
     /// Closed mesh of twelve triangles.
     pub fn mesh(&self) -> Mesh {

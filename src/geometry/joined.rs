@@ -132,12 +132,12 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Round bars through points (mm), of the sizes that links of `like` have.
+    /// Round bars through the body's points, holes and motors (mm), of the sizes that links of `like` have.
     ///
     /// # Errors
     /// Points that are no places.
-    pub fn new(name: &str, points: &[Vector3<f64>], like: &PartsInput) -> Result<Self, GeometryError> {
-        let body = BodySolid { name: name.into(), skeleton: points.to_vec(), ..BodySolid::default() };
+    pub fn new(body: BodySolid, like: &PartsInput) -> Result<Self, GeometryError> {
+        let only_solids = body.skeleton.is_empty() && body.holes.is_empty() && body.mounts.is_empty();
         let input = PartsInput {
             bodies: vec![body],
             flexures: Vec::new(),
@@ -147,7 +147,12 @@ impl Frame {
             least_wall_mm: like.least_wall_mm,
             facets: like.facets,
         };
-        let plans = plan_bodies(&input)?;
+        let plans = if only_solids {
+            let solids = input.bodies.iter().flat_map(|b| b.solids.iter().cloned()).collect();
+            vec![BodyPlan { solids, ..BodyPlan::default() }]
+        } else {
+            plan_bodies(&input)?
+        };
         let state = MovedState { poses: vec![Pose::rest(Vector3::zeros())], flexures: Vec::new() };
         Ok(Self { input, plans, carving: Carving::default(), state })
     }
@@ -371,6 +376,11 @@ impl Whole {
     pub fn flexures_of(&self, group: &[usize]) -> Vec<usize> {
         let inside = |f: &usize| self.input.flexures.get(*f).is_some_and(|f| group.contains(&f.bodies.0));
         (0..self.input.flexures.len()).filter(inside).collect()
+    }
+
+    /// Whether a mesh from a file is part of a group.
+    pub fn has_solids(&self, group: &[usize]) -> bool {
+        group.iter().filter_map(|b| self.plans.get(*b)).any(|p| !p.solids.is_empty())
     }
 
     /// What overlaps or comes too near in the rest pose.

@@ -296,7 +296,7 @@ fn build_planned(
             let kind = FitFaultKind::Unsound(facts.self_intersections);
             let at = facts.examples.first().map_or(first.shift, |(t, _)| part.mesh.corners(*t)[0]);
             out_of_reach.push(FitFault { motor: first.file.clone(), kind, at, origin: first.origin });
-        } else if facts.components > 1 {
+        } else if facts.components > 1 && !out_of_reach.iter().any(|f| f.origin == first.origin) {
             let kind = FitFaultKind::Pieces(facts.components);
             out_of_reach.push(FitFault {
                 motor: first.file.clone(),

@@ -338,6 +338,7 @@ fn proved(assembly: &Assembly, stages: &dyn Stages, out: &mut BuildOutcome) -> O
     let told = out.diagnostics.len();
     lints::text(assembly, out);
     let mut motions = Vec::new();
+    keep(solids::all_closed(assembly), &mut out.diagnostics)?;
     for design in &assembly.designs {
         let rigid = keep(stages.rigid(design, &starts(design)), &mut out.diagnostics)?;
         tell_once(rigid.diagnostics, out);

@@ -7,10 +7,11 @@ use crate::diagnostic::Diagnostic;
 use crate::equilibrium::{Cycle, Layout, Model};
 use crate::geometry::link::plan_body;
 use crate::geometry::{
-    Carving, Cut, CycleGaps, FitFault, FitFaultKind, Fusion, GeometryError, LeastGap, Member, MovedState,
-    Parts, build_wanted_parts, carve, carved_cycle_gaps, flexure_solid, parts_input, plan_bodies,
+    Carving, Cut, CycleGaps, FitFault, FitFaultKind, Fusion, GeometryError, LeastGap, Member, Mesh,
+    MovedState, Parts, build_wanted_parts, carve, carved_cycle_gaps, check_mesh, flexure_solid, parts_input,
+    plan_bodies,
 };
-use crate::ir::{AddedSolid, Design, Joint, JointKind, SurfaceFault, SurfaceFaultKind};
+use crate::ir::{AddedSolid, Assembly, Design, Joint, JointKind, Origin, SurfaceFault, SurfaceFaultKind};
 
 /// Builds the printed parts of a design in its rest pose; links make way for their own flexures in the `states` of the
 /// cycle. Meshed is only what is `wanted`, by the bodies of a part.
@@ -32,7 +33,7 @@ pub fn build(
     Ok((parts, found))
 }
 
-fn fit_fault(design: &Design, fault: &FitFault) -> Diagnostic {
+pub(super) fn fit_fault(design: &Design, fault: &FitFault) -> Diagnostic {
     let (p, motor, process) = (fault.at, &fault.motor, &design.process);
     let near = format!("near ({:.1}, {:.1}, {:.1}) mm of the rest pose", p.x, p.y, p.z);
     match fault.kind {
@@ -85,11 +86,35 @@ fn fit_fault(design: &Design, fault: &FitFault) -> Diagnostic {
     }
 }
 
+/// A part with a solid of which nothing sound came.
+pub(super) fn unsound(name: &str, mesh: &Mesh, at: Origin) -> Option<Diagnostic> {
+    let facts = check_mesh(mesh);
+    let what = match facts.self_intersections {
+        _ if facts.is_sound() => return None,
+        0 => "is not closed".into(),
+        n => format!("crosses itself at {n} places"),
+    };
+    let help = "faces of a solid and of a link probably lie in one plane: move it by a few hundredths of a millimetre";
+    Some(Diagnostic::error("E0656", format!("the part `{name}` {what}"), at).help(help))
+}
+
 /// Whether every solid's file bounds one.
 ///
 /// # Errors
 /// What is wrong with which, where and how often.
 pub fn closed(design: &Design) -> Result<(), Failed> {
+    bounding(design.bodies.iter().flat_map(|b| &b.fittings.solids))
+}
+
+/// The same of what is fitted to joined bodies.
+///
+/// # Errors
+/// As [`closed`].
+pub fn all_closed(assembly: &Assembly) -> Result<(), Failed> {
+    bounding(assembly.joined.iter().flat_map(|j| &j.fittings.solids))
+}
+
+fn bounding<'s>(solids: impl Iterator<Item = &'s AddedSolid>) -> Result<(), Failed> {
     let told = |solid: &AddedSolid| {
         let faults = crate::geometry::solid::faults(&solid.mesh);
         let first = faults.first()?;
@@ -109,7 +134,6 @@ pub fn closed(design: &Design) -> Result<(), Failed> {
         }
         Some(found.help("let a mesh program repair it (close holes, unite shells), or export it anew"))
     };
-    let solids = design.bodies.iter().flat_map(|b| &b.fittings.solids);
     let found: Vec<Diagnostic> = solids.filter_map(told).collect();
     if found.is_empty() { Ok(()) } else { Err(found) }
 }

@@ -89,14 +89,14 @@ impl Lower<'_> {
             Kind::Hole => {
                 let mut values = self.values(node).into_iter();
                 let (diameter, point) = (values.next()?, values.next()?);
-                let hole = Hole { diameter, body: self.ident(node)?, point, along: values.next() };
+                let hole = Hole { diameter, body: self.body_ref(node, 0)?, point, along: values.next() };
                 StatementKind::Hole(Box::new(hole))
             }
             Kind::Mount => StatementKind::Mount(Box::new(self.fitted(node)?)),
             Kind::Horn => StatementKind::Horn(Box::new(self.fitted(node)?)),
             Kind::Plate => {
                 let mut values = self.values(node).into_iter();
-                let (thickness, body) = (values.next()?, self.ident(node)?);
+                let (thickness, body) = (values.next()?, self.body_ref(node, 0)?);
                 StatementKind::Plate(Box::new(Plate { thickness, body, margin: values.next() }))
             }
             Kind::Solid => StatementKind::Solid(Box::new(self.solid(node)?)),
@@ -114,13 +114,19 @@ impl Lower<'_> {
         node.all(Kind::Value).map(|n| self.expr(n)).collect()
     }
 
-    fn fitted(&mut self, node: &Node) -> Option<Fitted> {
-        let mut names = self.idents(node).into_iter();
-        let (motor, mut body) = (names.next()?, names.next()?);
+    /// A body, or one of an instance, after so many other names.
+    fn body_ref(&mut self, node: &Node, before: usize) -> Option<Ident> {
+        let mut names = self.indexed(node).into_iter().skip(before);
+        let mut body = names.next()?;
         if let Some(inner) = names.next() {
             body.node = format!("{}.{}", body.node, inner.node);
             body.at.end = inner.at.end;
         }
+        Some(body)
+    }
+
+    fn fitted(&mut self, node: &Node) -> Option<Fitted> {
+        let (motor, body) = (self.ident(node)?, self.body_ref(node, 1)?);
         let point = self.value(node)?;
         let clause = |c: &Node| Some((self.named(c.first(Kind::Keyword)?), self.value(c)?));
         let clauses = node.all(Kind::Fitted).filter_map(clause).collect();
@@ -130,7 +136,7 @@ impl Lower<'_> {
     fn solid(&mut self, node: &Node) -> Option<Solid> {
         let text = node.first(Kind::Text)?;
         let file = At { node: self.quoted(text), at: self.origin(text) };
-        let body = self.ident(node)?;
+        let body = self.body_ref(node, 0)?;
         let mut solid = Solid { file, body, point: None, turned: Vec::new(), scale: None };
         let mut seen: Vec<(Kind, Origin)> = Vec::new();
         for clause in node.parts() {
