@@ -56,7 +56,8 @@ mechanism nodder {
 
 /// A block by half its edges, mm, as ASCII STL.
 fn block(half: [f64; 3]) -> String {
-    let corner = |i: usize| (0..3).map(|k| format!(" {}", if i >> k & 1 == 1 { half[k] } else { -half[k] }));
+    let corner =
+        |i: usize| (0..3).map(move |k| format!(" {}", if i >> k & 1 == 1 { half[k] } else { -half[k] }));
     let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     let triangles = faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]);
     let facet = |t: [usize; 3]| {

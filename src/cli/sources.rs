@@ -68,7 +68,9 @@ impl Files for Folder {
 }
 
 /// Files of solids that have been read, by path, with their length and time at that moment.
-static SOLIDS: Mutex<BTreeMap<PathBuf, (u64, SystemTime, Arc<SolidFile>)>> = Mutex::new(BTreeMap::new());
+static SOLIDS: Mutex<BTreeMap<PathBuf, Seen>> = Mutex::new(BTreeMap::new());
+/// Length and time of a file, and what was in it.
+type Seen = (u64, SystemTime, Arc<SolidFile>);
 /// A file that was written less than this before it was read may be written once more at the same time of its system's clock.
 const SETTLED: Duration = Duration::from_secs(2);
 
@@ -199,6 +201,30 @@ mod tests {
         std::os::unix::fs::symlink("../secret.mech", inner.join("link.mech")).unwrap();
         let (folder, _) = Folder::of(&inner.join("a.mech")).unwrap();
         assert_eq!(folder.read("link.mech"), Err(FileError::Outside));
+    }
+
+    #[test]
+    fn a_solid_is_read_once_while_its_file_is_the_same() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.stl");
+        let long_ago = |seconds: u64| SystemTime::UNIX_EPOCH + Duration::from_secs(1_000_000_000 + seconds);
+        let write = |text: &str, time: Option<SystemTime>| {
+            std::fs::write(&path, text).unwrap();
+            let file = File::options().write(true).open(&path).unwrap();
+            time.into_iter().for_each(|t| file.set_modified(t).unwrap());
+        };
+        let folder = Folder::at(dir.path()).unwrap();
+        let read = || folder.solid("a.stl").unwrap();
+        write("old", Some(long_ago(0)));
+        let first = read();
+        assert!(Arc::ptr_eq(&first, &read()));
+        write("new", Some(long_ago(1)));
+        assert!(!Arc::ptr_eq(&first, &read()));
+        // What has only just been written may be written once more at what the system takes for the same time.
+        write("now", None);
+        assert!(!Arc::ptr_eq(&read(), &read()));
+        assert_eq!(folder.solid("../a.stl").err(), Some(FileError::Outside));
+        assert_eq!(folder.solid("b.stl").err(), Some(FileError::NotFound));
     }
 
     #[test]

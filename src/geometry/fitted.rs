@@ -94,10 +94,6 @@ pub enum FitFaultKind {
     NoLayer,
     /// A solid this far from the rest of its link, mm.
     Loose(f64),
-    /// A part with a solid falls apart into so many pieces.
-    Pieces(usize),
-    /// A part with a solid crosses itself in so many places, or is not closed.
-    Unsound(usize),
 }
 
 /// A box that is cut out.

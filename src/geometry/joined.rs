@@ -378,11 +378,6 @@ impl Whole {
         (0..self.input.flexures.len()).filter(inside).collect()
     }
 
-    /// Whether a mesh from a file is part of a group.
-    pub fn has_solids(&self, group: &[usize]) -> bool {
-        group.iter().filter_map(|b| self.plans.get(*b)).any(|p| !p.solids.is_empty())
-    }
-
     /// What overlaps or comes too near in the rest pose.
     pub fn fusions(&self) -> Vec<Fusion> {
         fusions(&self.input, &self.plans, &self.groups(), &self.carving)

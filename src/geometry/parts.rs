@@ -6,7 +6,6 @@
 //! keep the layers apart, so nothing has to be glued. A motor's shaft passes the whole joint.
 
 use super::carve::{Carving, carve};
-use super::check::check_mesh;
 use super::cycle::MovedState;
 use super::fitted::{FitFault, FitFaultKind, MountSolid, PlateSolid, SeatSolid, out_of_reach};
 use super::gap::{Fusion, fusions};
@@ -14,7 +13,7 @@ use super::link::{BodyPlan, plan_body};
 use super::mesh::Mesh;
 use super::slot::Facets;
 use super::solid::PlacedSolid;
-use super::tidy::{SHORT_EDGE_MM, without_short_edges};
+use super::tidy::finished;
 use super::union::{BooleanError, subtract_all, union_all};
 use crate::math::Pose;
 use crate::rod::SectionShape;
@@ -287,25 +286,6 @@ fn build_planned(
         Ok(Part { name, bodies: bodies.clone(), mesh: Mesh::default(), links: Vec::new(), notes })
     };
     let parts = groups.par_iter().map(build).collect::<Result<Vec<Part>, GeometryError>>()?;
-    // Nobody vouches for the surface of a solid, so what came of it is looked at.
-    for part in parts.iter().filter(|p| !p.mesh.triangles.is_empty()) {
-        let mut solids = part.bodies.iter().filter_map(|b| plans.get(*b)).flat_map(|p| &p.solids);
-        let Some(first) = solids.next() else { continue };
-        let facts = check_mesh(&part.mesh);
-        if !facts.is_sound() {
-            let kind = FitFaultKind::Unsound(facts.self_intersections);
-            let at = facts.examples.first().map_or(first.shift, |(t, _)| part.mesh.corners(*t)[0]);
-            out_of_reach.push(FitFault { motor: first.file.clone(), kind, at, origin: first.origin });
-        } else if facts.components > 1 && !out_of_reach.iter().any(|f| f.origin == first.origin) {
-            let kind = FitFaultKind::Pieces(facts.components);
-            out_of_reach.push(FitFault {
-                motor: first.file.clone(),
-                kind,
-                at: first.shift,
-                origin: first.origin,
-            });
-        }
-    }
     Ok(Parts { parts, plans, carving, fusions, out_of_reach })
 }
 
@@ -361,7 +341,7 @@ pub(super) fn build_part(
     let links = solids.clone();
     solids.extend(input.flexures.iter().filter(inside).map(|f| f.mesh(input.facets.around)));
     let united = union_all(&solids).map_err(failed)?;
-    let mesh = without_short_edges(&united, SHORT_EDGE_MM).rounded_to_f32().sorted();
+    let mesh = finished(&united);
     let notes = bodies.iter().flat_map(|i| plans[*i].notes.iter().cloned()).collect();
     Ok(Part { name, bodies: bodies.to_vec(), mesh, links, notes })
 }

@@ -143,9 +143,6 @@ pub fn parts(assembly: &Assembly, solids: &[Solid]) -> Result<(Vec<Printed>, Vec
                     .help("move the instances until the common bodies meet, or join the pieces otherwise"),
             );
         }
-        if whole.has_solids(&group) {
-            found.extend(pieces.iter().find_map(|mesh| super::solids::unsound(&name, mesh, at)));
-        }
         for (k, mesh) in pieces.into_iter().enumerate() {
             let name = if k == 0 { name.clone() } else { format!("{name}_{}", k + 1) };
             // What is told of the whole part stands with its largest piece.

@@ -7,11 +7,10 @@ use crate::diagnostic::Diagnostic;
 use crate::equilibrium::{Cycle, Layout, Model};
 use crate::geometry::link::plan_body;
 use crate::geometry::{
-    Carving, Cut, CycleGaps, FitFault, FitFaultKind, Fusion, GeometryError, LeastGap, Member, Mesh,
-    MovedState, Parts, build_wanted_parts, carve, carved_cycle_gaps, check_mesh, flexure_solid, parts_input,
-    plan_bodies,
+    Carving, Cut, CycleGaps, FitFault, FitFaultKind, Fusion, GeometryError, LeastGap, Member, MovedState,
+    Parts, build_wanted_parts, carve, carved_cycle_gaps, flexure_solid, parts_input, plan_bodies,
 };
-use crate::ir::{AddedSolid, Assembly, Design, Joint, JointKind, Origin, SurfaceFault, SurfaceFaultKind};
+use crate::ir::{AddedSolid, Assembly, Design, Joint, JointKind, SurfaceFault, SurfaceFaultKind};
 
 /// Builds the printed parts of a design in its rest pose; links make way for their own flexures in the `states` of the
 /// cycle. Meshed is only what is `wanted`, by the bodies of a part.
@@ -63,20 +62,6 @@ pub(super) fn fit_fault(design: &Design, fault: &FitFault) -> Diagnostic {
                 .label(format!("the rest of the link is {gap:.2} mm away, {near}"))
                 .help("move it with `at`, turn it with `turned`, or give the link a point inside of it")
         }
-        FitFaultKind::Pieces(count) => {
-            let message = format!("the part with `{motor}` falls apart into {count} pieces");
-            Diagnostic::error("E0655", message, fault.origin)
-                .label("its file has pieces that do not meet, or what was cut out of it cuts it apart")
-                .help("unite the pieces in the program that made them, or let the flexures pass beside it")
-        }
-        FitFaultKind::Unsound(count) => {
-            let what =
-                if count > 0 { format!("crosses itself at {count} places") } else { "is not closed".into() };
-            let message = format!("the part with `{motor}` {what}");
-            Diagnostic::error("E0656", message, fault.origin)
-                .label(near)
-                .help("its faces and the link's probably lie in one plane there: move it by a few hundredths of a millimetre")
-        }
         FitFaultKind::InTheWay => {
             let message = format!("`{motor}` stands where its own link holds something else");
             Diagnostic::warning("W0649", message, fault.origin)
@@ -84,18 +69,6 @@ pub(super) fn fit_fault(design: &Design, fault: &FitFault) -> Diagnostic {
                 .help("turn the motor with `toward`, or move the link's points away from it")
         }
     }
-}
-
-/// A part with a solid of which nothing sound came.
-pub(super) fn unsound(name: &str, mesh: &Mesh, at: Origin) -> Option<Diagnostic> {
-    let facts = check_mesh(mesh);
-    let what = match facts.self_intersections {
-        _ if facts.is_sound() => return None,
-        0 => "is not closed".into(),
-        n => format!("crosses itself at {n} places"),
-    };
-    let help = "faces of a solid and of a link probably lie in one plane: move it by a few hundredths of a millimetre";
-    Some(Diagnostic::error("E0656", format!("the part `{name}` {what}"), at).help(help))
 }
 
 /// Whether every solid's file bounds one.
