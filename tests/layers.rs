@@ -65,7 +65,9 @@ fn each_dependency_is_seen_by_one_folder() {
         for (file, text) in &sources {
             // The command and the lints each read their table of `flexura.toml`; pages and the report are HTML.
             let shared = (name == "toml" && file == "cli/config.rs")
-                || (name == "askama" && file.starts_with("emit/report/"));
+                || (name == "askama" && file.starts_with("emit/report/"))
+                // One reads what the other writes.
+                || (name == "stl_io" && file == "elaborate/stl.rs");
             assert!(!uses(text, name) || file.starts_with(folder) || shared, "{file} uses {name}");
         }
     }

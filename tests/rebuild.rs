@@ -174,3 +174,25 @@ fn links_are_not_what_was_made() {
     assert!(!place.unchanged(&[]), "a link to the same bytes is no file of the folder");
     assert!(stl.symlink_metadata().unwrap().is_file());
 }
+
+#[test]
+fn another_file_of_a_solid_is_another_design() {
+    let place = Place::new();
+    let block = include_str!("elaborate/errors/solids/block.stl");
+    let stl = place.0.path().join("block.stl");
+    std::fs::write(&stl, block).unwrap();
+    place.write(&DESIGN.replace("    material", "    solid \"block.stl\" on arm at P\n    material"));
+    place.build(&[]);
+    assert!(place.unchanged(&[]));
+    let before = place.files();
+    std::fs::write(&stl, block.replace('6', "6.5")).unwrap();
+    assert!(!place.unchanged(&[]), "the block is higher");
+    let after = place.files();
+    let changed: Vec<&PathBuf> =
+        after.iter().filter(|(p, f)| before.get(*p).is_none_or(|b| b.0 != f.0)).map(|f| f.0).collect();
+    assert!(changed.iter().any(|p| p.ends_with("flap_base.stl")), "{changed:?}");
+    assert!(!changed.iter().any(|p| p.extension().is_some_and(|e| e == "lock")), "{changed:?}");
+    // The same bytes again change nothing, whatever their time.
+    std::fs::write(&stl, block.replace('6', "6.5")).unwrap();
+    assert!(place.unchanged(&[]));
+}

@@ -47,7 +47,7 @@ module.exports = grammar({
       choice(
         $.param, $.let, $.point, $.body, $.own_body, $.joint, $.material, $.print, $.links, $.model, $.cycle,
         $.drive, $.rest, $.trace, $.output, $.target, $.minimize, $.require, $.export, $.rod, $.load, $.hole,
-        $.mount, $.horn, $.plate, $.string, $.place, $.mirror, $.allow, $.assert, $.variant, $.for, $.case, $.workspace, $.later,
+        $.mount, $.horn, $.plate, $.solid, $.string, $.place, $.mirror, $.allow, $.assert, $.variant, $.for, $.case, $.workspace, $.later,
       ),
 
     // Names and numbers.
@@ -78,11 +78,13 @@ module.exports = grammar({
     template: ($) => seq("as", field("name", $.identifier), optional(alias($._fields, $.overrides))),
     links: ($) => seq("links", "height", $._value),
     model: ($) => seq("model", $.identifier),
-    hole: ($) => seq("hole", $._value, "on", $.identifier, "at", $._value, optional(seq("along", $._value))),
-    _fitted: ($) => seq(field("motor", $.identifier), "on", $.identifier, optional(seq(".", $.identifier)), "at", $._value),
+    hole: ($) => seq("hole", $._value, "on", $._body_ref, "at", $._value, optional(seq("along", $._value))),
+    _body_ref: ($) => seq($.identifier, optional($.index), optional(seq(".", $.identifier))),
+    _fitted: ($) => seq(field("motor", $.identifier), "on", $._body_ref, "at", $._value),
     mount: ($) => seq("mount", $._fitted, repeat(seq(choice("along", "toward", "thick", "clearance"), $._value))),
     horn: ($) => seq("horn", $._fitted, repeat(seq(choice("deep", "clearance"), $._value))),
-    plate: ($) => seq("plate", $._value, "on", $.identifier, optional(seq("margin", $._value))),
+    plate: ($) => seq("plate", $._value, "on", $._body_ref, optional(seq("margin", $._value))),
+    solid: ($) => seq("solid", field("file", $.text), "on", $._body_ref, repeat(choice(seq("at", $._value), $.turned, $.scaled))),
     string: ($) =>
       seq("string", field("name", $.identifier), ":", $.identifier, "at", $._value, "to", $.identifier, "via", commas($._value)),
 
@@ -152,7 +154,7 @@ module.exports = grammar({
     // Statements of the whole language that are only recognised yet.
     later: ($) =>
       seq(
-        choice("fatigue", "solid", "spring", "stop", "sweep", "tolerance"),
+        choice("fatigue", "spring", "stop", "sweep", "tolerance"),
         repeat(choice($._anything, $._later_block)),
       ),
     _anything: (_) => /[^\s{}][^\r\n{}]*/,

@@ -8,9 +8,10 @@ use super::{Common, Format};
 use clap::Args;
 use flexura::diagnostic::{Fix, Severity, apply};
 use flexura::lint::baseline::Baseline;
-use flexura::pipeline::{self, BuildOutcome, Compiler, FileError, Files, Request, placeless};
+use flexura::pipeline::{self, BuildOutcome, Compiler, FileError, Files, Request, SolidFile, placeless};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
@@ -140,5 +141,9 @@ impl Files for Overlay<'_> {
             Some(text) => Ok(text.clone()),
             None => self.below.read(path),
         }
+    }
+
+    fn solid(&self, path: &str) -> Result<Arc<SolidFile>, FileError> {
+        self.below.solid(path)
     }
 }

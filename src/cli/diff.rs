@@ -9,10 +9,13 @@ use super::style::Style;
 use clap::Args;
 use flexura::diagnostic::Severity;
 use flexura::diff::{Diff as Changes, NameChange, Number, Row, Simulated, compare};
-use flexura::pipeline::{Compiler, Examined, Extent, FileError, Files, Request, Values, examine, placeless};
+use flexura::pipeline::{
+    Compiler, Examined, Extent, FileError, Files, Request, SolidFile, Values, examine, placeless,
+};
 use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
+use std::sync::Arc;
 
 /// Numbers of a kind that a person is shown; `--format json` has all.
 const MOST_OF_A_KIND: usize = 8;
@@ -62,6 +65,10 @@ impl Files for Instead {
             Some(others) => others.read(path),
             None => Err(FileError::NotFound),
         }
+    }
+
+    fn solid(&self, path: &str) -> Result<Arc<SolidFile>, FileError> {
+        self.others.as_ref().map_or(Err(FileError::NotFound), |others| others.solid(path))
     }
 }
 

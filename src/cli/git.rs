@@ -1,9 +1,10 @@
 //! Files of a git revision, read by git itself.
 
 use super::sources::MOST_BYTES;
-use flexura::pipeline::{FileError, Files};
+use flexura::pipeline::{FileError, Files, MOST_SOLID_BYTES, SolidFile};
 use std::path::{Component, Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::Arc;
 
 /// Newest commits that are looked at for a file's content.
 const MOST_COMMITS: &str = "-n100";
@@ -84,8 +85,9 @@ impl Revision {
     }
 }
 
-impl Files for Revision {
-    fn read(&self, path: &str) -> Result<String, FileError> {
+impl Revision {
+    /// Bytes of a file, at most so many.
+    fn bytes(&self, path: &str, most: u64) -> Result<Vec<u8>, FileError> {
         if !Path::new(path).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir)) {
             return Err(FileError::Outside);
         }
@@ -98,10 +100,19 @@ impl Files for Revision {
             let why = format!("there is no revision `{}` in this repository", self.rev);
             return Err(if known { FileError::NotFound } else { FileError::Other(why) });
         };
-        if size.parse::<u64>().is_ok_and(|bytes| bytes > MOST_BYTES) {
+        if size.parse::<u64>().is_ok_and(|bytes| bytes > most) {
             return Err(FileError::TooLarge);
         }
-        let bytes = ask(&self.at, &["cat-file", "blob", &name]).map_err(FileError::Other)?;
-        String::from_utf8(bytes).map_err(|_| FileError::NotText)
+        ask(&self.at, &["cat-file", "blob", &name]).map_err(FileError::Other)
+    }
+}
+
+impl Files for Revision {
+    fn read(&self, path: &str) -> Result<String, FileError> {
+        String::from_utf8(self.bytes(path, MOST_BYTES)?).map_err(|_| FileError::NotText)
+    }
+
+    fn solid(&self, path: &str) -> Result<Arc<SolidFile>, FileError> {
+        Ok(Arc::new(SolidFile::new(self.bytes(path, MOST_SOLID_BYTES as u64)?)))
     }
 }

@@ -7,7 +7,7 @@ use super::lints::LintFlags;
 use super::render::refuse;
 use super::sources::Folder;
 use clap::Args;
-use flexura::elaborate::{FileError, std_source};
+use flexura::elaborate::{FileError, SolidFile, std_source};
 use flexura::lint::Levels;
 use flexura::lsp::{Host, Work, server};
 use flexura::pipeline::Files;
@@ -101,6 +101,10 @@ const MOST_FILES: usize = 500;
 impl Host for Disk {
     fn read(&self, folder: &str, path: &str) -> Result<String, FileError> {
         Folder::at(Path::new(folder))?.read(path)
+    }
+
+    fn solid(&self, folder: &str, path: &str) -> Result<Arc<SolidFile>, FileError> {
+        Folder::at(Path::new(folder))?.solid(path)
     }
 
     fn list(&self, folder: &str) -> Vec<String> {

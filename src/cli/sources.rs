@@ -1,11 +1,12 @@
 //! Reading from the disk: only text files below the design's own folder, and not without limit.
 
-use flexura::pipeline::{FileError, Files};
+use flexura::pipeline::{FileError, Files, MOST_SOLID_BYTES, SolidFile};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, SystemTime};
 
 /// Largest file read, bytes. The sample designs have about 3 kB, their locks less.
 pub const MOST_BYTES: u64 = 4 << 20;
@@ -36,8 +37,9 @@ impl Folder {
     }
 }
 
-impl Files for Folder {
-    fn read(&self, path: &str) -> Result<String, FileError> {
+impl Folder {
+    /// Where a file is, if it is below the folder.
+    fn below(&self, path: &str) -> Result<PathBuf, FileError> {
         let relative = Path::new(path);
         if !relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir)) {
             return Err(FileError::Outside);
@@ -48,8 +50,55 @@ impl Files for Folder {
         if !full.starts_with(&self.root) {
             return Err(FileError::Outside);
         }
-        read_text(&full)
+        Ok(full)
     }
+}
+
+impl Files for Folder {
+    fn read(&self, path: &str) -> Result<String, FileError> {
+        read_text(&self.below(path)?)
+    }
+
+    fn solid(&self, path: &str) -> Result<Arc<SolidFile>, FileError> {
+        let full = self.below(path)?;
+        let read = read_solid(&full);
+        note(&full);
+        read
+    }
+}
+
+/// Files of solids that have been read, by path, with their length and time at that moment.
+static SOLIDS: Mutex<BTreeMap<PathBuf, Seen>> = Mutex::new(BTreeMap::new());
+/// Length and time of a file, and what was in it.
+type Seen = (u64, SystemTime, Arc<SolidFile>);
+/// A file that was written less than this before it was read may be written once more at the same time of its system's clock.
+const SETTLED: Duration = Duration::from_secs(2);
+
+/// The file of a solid: the one that was read before where neither its length nor its time have changed.
+fn read_solid(path: &Path) -> Result<Arc<SolidFile>, FileError> {
+    let found = path.metadata().map_err(|e| reason(&e))?;
+    if !found.is_file() {
+        return Err(FileError::Other("it is not a file".into()));
+    }
+    let (length, time) = (found.len(), found.modified().unwrap_or(SystemTime::UNIX_EPOCH));
+    let mut solids = SOLIDS.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, _, known)) = solids.get(path).filter(|(l, t, _)| (*l, *t) == (length, time)) {
+        return Ok(known.clone());
+    }
+    let most = MOST_SOLID_BYTES as u64;
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(|e| reason(&e))?;
+    file.take(most + 1).read_to_end(&mut bytes).map_err(|e| reason(&e))?;
+    if bytes.len() as u64 > most {
+        return Err(FileError::TooLarge);
+    }
+    let read = Arc::new(SolidFile::new(bytes));
+    if SystemTime::now().duration_since(time).is_ok_and(|age| age > SETTLED) {
+        solids.insert(path.to_path_buf(), (length, time, read.clone()));
+    } else {
+        solids.remove(path);
+    }
+    Ok(read)
 }
 
 /// Text of a file, if it is a file, text, and not too large. (A pipe could block for ever.)
@@ -79,10 +128,15 @@ pub fn forget() {
     SEEN.lock().unwrap_or_else(PoisonError::into_inner).clear();
 }
 
-/// Digest of a regular file; none where there is none.
+/// Digest of a regular file; none where there is none. Of a large one, which only a solid's may be, that of its length and time: it
+/// is asked for every few seconds.
 pub fn digest_of(path: &Path) -> Option<Vec<u8>> {
     use sha2::Digest;
-    path.metadata().ok().filter(|m| m.is_file() && m.len() <= MOST_BYTES)?;
+    let found = path.metadata().ok().filter(|m| m.is_file() && m.len() <= MOST_SOLID_BYTES as u64)?;
+    if found.len() > MOST_BYTES {
+        let time = found.modified().ok()?.duration_since(SystemTime::UNIX_EPOCH).ok()?;
+        return Some(sha2::Sha256::digest(format!("{} {}", found.len(), time.as_nanos())).to_vec());
+    }
     Some(sha2::Sha256::digest(std::fs::read(path).ok()?).to_vec())
 }
 
@@ -147,6 +201,30 @@ mod tests {
         std::os::unix::fs::symlink("../secret.mech", inner.join("link.mech")).unwrap();
         let (folder, _) = Folder::of(&inner.join("a.mech")).unwrap();
         assert_eq!(folder.read("link.mech"), Err(FileError::Outside));
+    }
+
+    #[test]
+    fn a_solid_is_read_once_while_its_file_is_the_same() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.stl");
+        let long_ago = |seconds: u64| SystemTime::UNIX_EPOCH + Duration::from_secs(1_000_000_000 + seconds);
+        let write = |text: &str, time: Option<SystemTime>| {
+            std::fs::write(&path, text).unwrap();
+            let file = File::options().write(true).open(&path).unwrap();
+            time.into_iter().for_each(|t| file.set_modified(t).unwrap());
+        };
+        let folder = Folder::at(dir.path()).unwrap();
+        let read = || folder.solid("a.stl").unwrap();
+        write("old", Some(long_ago(0)));
+        let first = read();
+        assert!(Arc::ptr_eq(&first, &read()));
+        write("new", Some(long_ago(1)));
+        assert!(!Arc::ptr_eq(&first, &read()));
+        // What has only just been written may be written once more at what the system takes for the same time.
+        write("now", None);
+        assert!(!Arc::ptr_eq(&read(), &read()));
+        assert_eq!(folder.solid("../a.stl").err(), Some(FileError::Outside));
+        assert_eq!(folder.solid("b.stl").err(), Some(FileError::NotFound));
     }
 
     #[test]

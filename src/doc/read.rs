@@ -106,6 +106,7 @@ impl Source<'_> {
                 StatementKind::Mount(_) => ("mount", without("mount", &self.at(s.at))),
                 StatementKind::Horn(_) => ("horn", without("horn", &self.at(s.at))),
                 StatementKind::Plate(_) => ("plate", without("plate", &self.at(s.at))),
+                StatementKind::Solid(_) => ("solid", without("solid", &self.at(s.at))),
                 StatementKind::Require { .. } => ("require", without("require", &self.at(s.at))),
                 StatementKind::Place(_) => ("place", without("place", &self.at(s.at))),
                 StatementKind::Mirror(_) => ("mirror", without("mirror", &self.at(s.at))),

@@ -83,11 +83,13 @@ codes! {
     SHARED "E0461" "a body that a mirrored instance cannot share";
     MIXED "E0462" "one body of two materials or processes";
     FITTING "E0463" "a mount or horn that its motor or its place does not allow";
+    SOLID_FILE "E0464" "a file that cannot become a solid: no STL, empty, too large, no places";
     LATER_STATEMENT "E0901" "a statement that is not available yet";
     LATER_TERM "E0902" "an objective, query, export or function that is not available yet";
     LATER_JOINT "E0903" "a kind of joint that is not available yet";
     UNUSED_IMPORT "W0101" "an import that is not used";
     IDLE_FREE "W0201" "a `free` value that nothing depends on";
+    INSIDE_OUT "W0464" "a solid whose file is inside out";
 }
 
 #[cfg(test)]

@@ -47,7 +47,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    fn mount(
+    pub(super) fn mount(
         &mut self,
         scope: usize,
         module: usize,

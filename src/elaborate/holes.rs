@@ -21,7 +21,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    fn hole(
+    pub(super) fn hole(
         &mut self,
         scope: usize,
         text: &'a ast::Hole,

@@ -72,7 +72,8 @@ impl Parts {
             Some(group) => group.members.push(second),
             None => {
                 let members = first.into_iter().chain([second]).collect();
-                self.joined.push(Joined { name, members, skeleton: Vec::new(), origin: at });
+                let (skeleton, holes, fittings) = Default::default();
+                self.joined.push(Joined { name, members, skeleton, holes, fittings, origin: at });
             }
         }
     }
@@ -127,6 +128,7 @@ impl<'a> Evaluator<'a> {
         }
         self.mirrors(&sheet, &mut parts);
         self.own_shapes(scope, &sheet, &mut parts);
+        let exprs = self.own_fittings(scope, &sheet, &mut parts, outside);
         self.same_cycles(&parts);
         self.same_stuff(&parts);
         let requirements = queries
@@ -138,7 +140,17 @@ impl<'a> Evaluator<'a> {
             queries.exports.iter().filter_map(|q| self.instance_export(scope, q, &parts).ok()).collect();
         let Parts { designs, instances, joined, motors, .. } = parts;
         let name = m.name.node.clone();
-        Some(Assembly { name, designs, instances, joined, motors, requirements, exports, origin: m.name.at })
+        Some(Assembly {
+            name,
+            designs,
+            instances,
+            joined,
+            motors,
+            requirements,
+            exports,
+            exprs,
+            origin: m.name.at,
+        })
     }
 
     /// Only instances and what concerns the whole may stand beside instances.
@@ -157,6 +169,16 @@ impl<'a> Evaluator<'a> {
                     );
                     continue;
                 }
+                StatementKind::Horn(_) | StatementKind::Plate(_) => {
+                    let message = "this belongs into the mechanism that is placed";
+                    let label = match &s.kind {
+                        StatementKind::Horn(_) => "a horn sits on a hinge, and hinges stand in mechanisms",
+                        _ => "a plate lies in a layer, and layers are those of mechanisms",
+                    };
+                    let help = "write it there: every copy then has its own";
+                    self.out.push(Diagnostic::error(codes::FITTING, message, s.at).label(label).help(help));
+                    continue;
+                }
                 StatementKind::Joint(j) => j.kind.node.as_str(),
                 StatementKind::Material(_) => "material",
                 StatementKind::PrintOn(_) => "print on",
@@ -167,10 +189,6 @@ impl<'a> Evaluator<'a> {
                 StatementKind::Trace { .. } => "trace",
                 StatementKind::Minimize(_) => "minimize",
                 StatementKind::Load(_) => "load",
-                StatementKind::Hole(_) => "hole",
-                StatementKind::Mount(_) => "mount",
-                StatementKind::Horn(_) => "horn",
-                StatementKind::Plate(_) => "plate",
                 StatementKind::Output { .. } => "output",
                 StatementKind::Target { .. } => "target",
                 StatementKind::Workspace(_) => "workspace",

@@ -50,6 +50,7 @@ impl<'a> Evaluator<'a> {
         };
         let mut s = self.structure(scope, &sheet, m.name.at);
         self.fittings(scope, module, &sheet, &mut s);
+        self.solids(scope, &sheet, &mut s, outside);
         let strings = self.strings(scope, &sheet, &mut s);
         let clearance = process.as_ref().map(|(_, p)| p.clearance_mm);
         let layers = self.layers(scope, &sheet, &s, clearance).ok();
@@ -257,6 +258,7 @@ fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
         b.holes.iter_mut().flat_map(|h| &mut h.position).for_each(&mut *f);
         let mounts = b.fittings.mounts.iter_mut();
         mounts.flat_map(|m| m.position.iter_mut().chain(m.toward.iter_mut().flatten())).for_each(&mut *f);
+        b.fittings.solids.iter_mut().flat_map(|s| &mut s.position).for_each(&mut *f);
     }
     for j in &mut design.joints {
         j.point.iter_mut().for_each(&mut *f);

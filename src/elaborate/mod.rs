@@ -32,6 +32,7 @@ mod members;
 mod mirroring;
 mod motor_form;
 mod names;
+mod own_fittings;
 mod places;
 mod placing;
 mod profiles;
@@ -42,6 +43,8 @@ mod scaling;
 mod scope;
 mod settings;
 mod sheet;
+mod solids;
+mod stl;
 mod strings;
 mod structure;
 mod table;
@@ -63,6 +66,8 @@ pub use known::{KnownValue, quantity};
 pub use load::{std_modules, std_source, std_text};
 use settings::Settings;
 use std::fmt;
+use std::sync::Arc;
+pub use stl::{MOST_BYTES as MOST_SOLID_BYTES, SolidFile, StlFault};
 
 /// Why a file could not be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -99,6 +104,15 @@ pub trait Files {
     /// # Errors
     /// Why it could not be read.
     fn read(&self, path: &str) -> Result<String, FileError>;
+
+    /// The file of a solid, by the same rules; it need not be text. Who can should keep it while it is the same: it is asked for
+    /// whenever a text is understood anew.
+    ///
+    /// # Errors
+    /// Why it could not be read.
+    fn solid(&self, path: &str) -> Result<Arc<SolidFile>, FileError> {
+        self.read(path).map(|text| Arc::new(SolidFile::new(text.into_bytes())))
+    }
 }
 
 /// Files held in memory: pairs of path and text.

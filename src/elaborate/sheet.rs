@@ -58,6 +58,7 @@ pub struct Sheet<'a> {
     pub mounts: Vec<(&'a ast::Fitted, Origin)>,
     pub horns: Vec<(&'a ast::Fitted, Origin)>,
     pub plates: Vec<(&'a ast::Plate, Origin)>,
+    pub solids: Vec<(&'a ast::Solid, Origin)>,
     pub rests: Vec<(&'a Ident, &'a Expr, Origin)>,
     pub traces: Vec<TraceText<'a>>,
     /// Traced directions.
@@ -187,6 +188,7 @@ impl<'a> Evaluator<'a> {
             StatementKind::Mount(mount) => sheet.mounts.push((mount, at)),
             StatementKind::Horn(horn) => sheet.horns.push((horn, at)),
             StatementKind::Plate(plate) => sheet.plates.push((plate, at)),
+            StatementKind::Solid(solid) => sheet.solids.push((solid, at)),
             StatementKind::Rest { joint, value } => sheet.rests.push((joint, value, at)),
             StatementKind::Trace { name, direction: true, point, body } => {
                 if self.name_thing(scope, name, "direction") {

@@ -6,11 +6,13 @@ use super::check::Tree;
 use super::cycle::MovedState;
 use super::distance::{point_triangle, separation};
 use super::field::Field;
+use super::fitted::Pocket;
 use super::gap::{NEAR_MM, ROOT_MM};
 use super::link::{BodyPlan, Role};
 use super::mesh::Mesh;
 use super::parts::{FlexureSolid, GeometryError, PartsInput};
 use super::slot::Slot;
+use super::solid::surfaces;
 use super::union::{BooleanError, subtract_all, union_all};
 use super::wall::{Wall, least_wall};
 use crate::math::Pose;
@@ -159,11 +161,19 @@ fn meets(
             (*s, center, radius)
         })
         .collect();
+    let solids = surfaces(plan);
     for (k, shape) in shapes.iter().enumerate() {
         for (way, piece) in from_root(shape, body).iter().filter(|(way, _)| *way >= ROOT_MM) {
             // Beside its root a flexure cannot keep the clearance, but must not be swallowed.
             let limit = if *way >= NEAR_MM { input.clearance_mm - 1e-6 } else { 0.0 };
             let (center, radius) = piece.bounding_sphere();
+            for solid in &solids {
+                let bound = worst.as_ref().map_or(limit, |w| (-w.depth_mm).min(limit));
+                if let Some((gap, at)) = solid.gap_to_slot(piece, bound) {
+                    let (depth_mm, state) = (-gap, k.checked_sub(1));
+                    worst = Some(Cut { body, flexure, depth_mm, at, state, wall_mm: None, made: false });
+                }
+            }
             for (slot, c, r) in &others {
                 let bound = worst.as_ref().map_or(limit, |w| (-w.depth_mm).min(limit));
                 if (c - center).norm() - r - radius >= bound {
@@ -207,7 +217,12 @@ fn swept(input: &PartsInput, plan: &BodyPlan, cut: &Cut, shapes: &[FlexureSolid]
         })
     };
     let edge = BEYOND_MM + 2.0 * STEP_MM;
-    let (a, b) = (room(&mut pieces.iter(), grown + edge), room(&mut link.iter().copied(), edge));
+    let boxes: Vec<Pocket> = plan.solids.iter().filter_map(|s| Pocket::round(&s.mesh())).collect();
+    let (a, mut b) = (room(&mut pieces.iter(), grown + edge), room(&mut link.iter().copied(), edge));
+    for p in &boxes {
+        let size = Vector3::from(p.half_mm).add_scalar(edge);
+        b = (b.0.inf(&(p.center - size)), b.1.sup(&(p.center + size)));
+    }
     let (least, largest) = (a.0.sup(&b.0), a.1.inf(&b.1));
     let far = 2.0 * STEP_MM;
     let mut field = Field::new(&least, &largest, STEP_MM, far);
@@ -215,6 +230,9 @@ fn swept(input: &PartsInput, plan: &BodyPlan, cut: &Cut, shapes: &[FlexureSolid]
     // Only what is near the link has to be meshed.
     let mut near = Field::new(&least, &largest, STEP_MM, edge);
     link.iter().for_each(|s| near.add(s, 0.0, edge));
+    for p in &boxes {
+        near.near(&p.around(), edge, |at, value| *value = value.min(p.signed_distance(at)));
+    }
     let mut tool = field.clone();
     for (t, l) in tool.values.iter_mut().zip(&near.values) {
         *t = t.max(l - BEYOND_MM);
@@ -290,6 +308,7 @@ fn carved(input: &PartsInput, plan: &BodyPlan, tools: &[(usize, Field, Mesh)]) -
         .zip(&meshes)
         .filter(|((r, _), _)| kept(r).is_none())
         .map(|(_, m)| m.clone())
+        .chain(plan.solids.iter().map(|s| s.mesh()))
         .collect();
     let all: Vec<Mesh> = tools.iter().map(|t| t.2.clone()).collect();
     let mut pieces = Vec::new();

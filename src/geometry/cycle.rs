@@ -7,6 +7,7 @@ use super::gap::{Member, NEAR_MM, ROOT_MM};
 use super::link::{BodyPlan, Role};
 use super::parts::FlexureSolid;
 use super::slot::Slot;
+use super::solid::{Beside, Surface, surfaces};
 use crate::math::Pose;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -71,7 +72,8 @@ pub fn carved_cycle_gaps(
 ) -> CycleGaps {
     let links: BTreeMap<usize, CarvedLink<'_>> =
         carving.links.iter().map(|(body, mesh)| (*body, CarvedLink::new(mesh))).collect();
-    let carved = Carved { carving, links, clearance_mm };
+    let solids = plans.iter().map(surfaces).collect();
+    let carved = Carved { carving, links, clearance_mm, solids };
     let measured: Vec<(Option<LeastGap>, Vec<LeastGap>)> = states
         .par_iter()
         .enumerate()
@@ -97,6 +99,14 @@ struct Carved<'a> {
     carving: &'a Carving,
     links: BTreeMap<usize, CarvedLink<'a>>,
     clearance_mm: f64,
+    /// Of each body.
+    solids: Vec<Vec<Surface>>,
+}
+
+impl Carved<'_> {
+    fn solids(&self, body: usize) -> &[Surface] {
+        self.solids.get(body).map_or(&[], Vec::as_slice)
+    }
 }
 
 /// The nearest pair so far, and all that overlap.
@@ -139,6 +149,22 @@ impl<F: Fn(Member, Member) -> bool> Search<'_, F> {
         }
     }
 
+    /// The same for the solids of two members.
+    fn compare_solids(
+        &mut self,
+        (a, first): (Member, &Beside<'_>),
+        (b, second): (Member, &Beside<'_>),
+        bound: f64,
+    ) {
+        if (first.solids.is_empty() && second.solids.is_empty()) || (self.skipped)(a, b) {
+            return;
+        }
+        let bound = self.least.map_or(bound, |l| l.gap_mm.max(0.0).min(bound));
+        if let Some((gap_mm, at)) = first.gap(second, bound) {
+            self.note(LeastGap { state: self.state, a, b, gap_mm, at });
+        }
+    }
+
     fn note(&mut self, best: LeastGap) {
         if best.gap_mm < 0.0 {
             match self.overlaps.iter_mut().find(|o| (o.a, o.b) == (best.a, best.b)) {
@@ -173,6 +199,10 @@ pub(super) fn one_joint(a: Option<Role>, b: Option<Role>) -> bool {
     matches!((a, b), (Some(Role::Eye(a)), Some(Role::Eye(b))) | (Some(Role::Guide(a)), Some(Role::Guide(b))) if a == b)
 }
 
+fn slots_of(pieces: &[Piece]) -> Vec<Slot> {
+    pieces.iter().map(|p| p.slot).collect()
+}
+
 fn state_gaps(
     plans: &[BodyPlan],
     state: usize,
@@ -197,6 +227,12 @@ fn state_gaps(
             search.compare((Member::Body(i), first), (Member::Body(j), second), f64::INFINITY, |p, q| {
                 one_joint(p.role, q.role)
             });
+            if !carved.solids(i).is_empty() || !carved.solids(j).is_empty() {
+                let (slots, others) = (slots_of(first), slots_of(second));
+                let one = Beside { solids: carved.solids(i), pose: &moved.poses[i], slots: &slots };
+                let other = Beside { solids: carved.solids(j), pose: &moved.poses[j], slots: &others };
+                search.compare_solids((Member::Body(i), &one), (Member::Body(j), &other), f64::INFINITY);
+            }
         }
     }
     let flexures: Vec<Vec<Piece>> =
@@ -230,6 +266,20 @@ fn state_gaps(
                     }
                 }
                 continue;
+            }
+            let solids = carved.solids(i);
+            if !solids.is_empty() {
+                let body = Beside { solids, pose: &moved.poses[i], slots: &[] };
+                let mut beyond = |depth: f64, bound: f64| {
+                    let away: Vec<Slot> =
+                        pieces.iter().filter(|q| !within(q, depth)).map(|q| q.slot).collect();
+                    let flexure = Beside { solids: &[], pose: &moved.poses[i], slots: &away };
+                    search.compare_solids((Member::Body(i), &body), (Member::Flexure(f), &flexure), bound);
+                };
+                beyond(NEAR_MM, f64::INFINITY);
+                if !own.is_empty() {
+                    beyond(ROOT_MM, 0.0);
+                }
             }
             search.compare(member, (Member::Flexure(f), pieces), f64::INFINITY, |_, q| within(q, NEAR_MM));
             if !own.is_empty() {

@@ -25,6 +25,46 @@ pub struct Separation {
     pub at: Vector3<f64>,
 }
 
+/// The convex core of a solid: all of it but the ball round each of its points.
+pub(super) trait Core {
+    /// Its farthest point in a direction.
+    fn support(&self, direction: &Vector3<f64>) -> Vector3<f64>;
+    /// Any point of it.
+    fn start(&self) -> Vector3<f64>;
+    /// Radius of the ball, mm.
+    fn round_mm(&self) -> f64;
+}
+
+impl Core for Slot {
+    fn support(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        Slot::support(self, direction)
+    }
+
+    fn start(&self) -> Vector3<f64> {
+        self.start
+    }
+
+    fn round_mm(&self) -> f64 {
+        self.round_mm
+    }
+}
+
+/// A triangle.
+impl Core for [Vector3<f64>; 3] {
+    fn support(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        let [a, b, c] = self.map(|p| p.dot(direction));
+        if a >= b && a >= c { self[0] } else { self[if b >= c { 1 } else { 2 }] }
+    }
+
+    fn start(&self) -> Vector3<f64> {
+        self[0]
+    }
+
+    fn round_mm(&self) -> f64 {
+        0.0
+    }
+}
+
 #[derive(Clone, Copy)]
 struct Vertex {
     w: Vector3<f64>,
@@ -115,13 +155,13 @@ fn closest_in_plan(a: &Slot, b: &Slot, axis: &Vector3<f64>) -> (Vector3<f64>, Ve
 }
 
 /// Signed distance, or some gap of at least `enough_mm` as soon as the true one is known to be as large.
-fn until_apart(a: &Slot, b: &Slot, enough_mm: f64) -> Separation {
-    let balls = a.round_mm + b.round_mm;
+pub(super) fn until_apart(a: &impl Core, b: &impl Core, enough_mm: f64) -> Separation {
+    let balls = a.round_mm() + b.round_mm();
     let support = |d: &Vector3<f64>| {
         let on_a = a.support(&-d);
         Vertex { w: on_a - b.support(d), on_a }
     };
-    let mut simplex = vec![support(&((a.start - b.start) + Vector3::new(1e-3, 2e-3, 3e-3)))];
+    let mut simplex = vec![support(&((a.start() - b.start()) + Vector3::new(1e-3, 2e-3, 3e-3)))];
     let mut v = simplex[0].w;
     let mut on_a = simplex[0].on_a;
     for _ in 0..MOST_STEPS {

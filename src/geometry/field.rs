@@ -15,9 +15,9 @@ const SNAP: f64 = 0.05;
 /// Distances on a regular grid, mm; negative inside.
 #[derive(Clone, Debug)]
 pub(super) struct Field {
-    origin: Vector3<f64>,
+    pub(super) origin: Vector3<f64>,
     pub(super) step: f64,
-    count: [usize; 3],
+    pub(super) count: [usize; 3],
     pub(super) values: Vec<f64>,
 }
 

@@ -71,7 +71,7 @@ pub struct PlateSolid {
 /// What is wrong with a seat.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitFault {
-    /// Name of the motor.
+    /// Name of the motor, or the file of a solid.
     pub motor: String,
     /// What.
     pub kind: FitFaultKind,
@@ -92,6 +92,8 @@ pub enum FitFaultKind {
     NoReach(usize),
     /// A plate of a body without layers.
     NoLayer,
+    /// A solid this far from the rest of its link, mm.
+    Loose(f64),
 }
 
 /// A box that is cut out.
@@ -103,6 +105,34 @@ pub struct Pocket {
     pub edges: [Vector3<f64>; 3],
     /// Half its size along them, mm.
     pub half_mm: [f64; 3],
+}
+
+impl MountSolid {
+    /// A motor on a body that stands still and has no layers, its shaft in no joint: at `point` (mm), with the rest of the body
+    /// round `rest`, between links of a height, where the process keeps `clearance_mm`.
+    pub fn standing(
+        mount: &Mount,
+        point: Vector3<f64>,
+        toward: Option<Vector3<f64>>,
+        rest: Vector3<f64>,
+        [height_mm, clearance_mm]: [f64; 2],
+    ) -> Self {
+        let axis = mount.along.map_or_else(Vector3::z, Vector3::from);
+        let off = toward.unwrap_or(rest) - point;
+        let flat = (off - axis * off.dot(&axis)).try_normalize(SAME_POINT_MM);
+        Self {
+            motor: mount.motor.clone(),
+            point,
+            axis,
+            forward: flat.unwrap_or_else(|| any_normal(&axis)),
+            rest,
+            bears: false,
+            passes: false,
+            thick_mm: mount.thickness_mm(height_mm),
+            clearance_mm: mount.clearance_mm.unwrap_or(clearance_mm),
+            origin: mount.origin,
+        }
+    }
 }
 
 impl Pocket {
@@ -117,6 +147,13 @@ impl Pocket {
         let triangles = faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]);
         let triangles = triangles.map(|[a, b, c]| if turned { [a, c, b] } else { [a, b, c] }).collect();
         Mesh { vertices: (0..8).map(corner).collect(), triangles }
+    }
+
+    /// The upright box round a mesh; none round an empty one.
+    pub(super) fn round(mesh: &Mesh) -> Option<Pocket> {
+        let (low, high) = mesh.bounding_box()?;
+        let edges = [Vector3::x(), Vector3::y(), Vector3::z()];
+        Some(Pocket { center: (low + high) / 2.0, edges, half_mm: ((high - low) / 2.0).into() })
     }
 
     /// The pocket in another place.

@@ -5,6 +5,8 @@ use super::distance::separation;
 use super::link::{BodyPlan, Role};
 use super::parts::PartsInput;
 use super::slot::Slot;
+use super::solid::{Beside, Surface, surfaces};
+use crate::math::Pose;
 use nalgebra::Vector3;
 
 /// Next to its ends a flexure cannot keep the clearance from its own link, mm…
@@ -47,10 +49,24 @@ pub fn fusions(
 ) -> Vec<Fusion> {
     let group_of = |body: usize| groups.iter().position(|g| g.contains(&body));
     let mut found = Vec::new();
+    let solids: Vec<Vec<Surface>> = plans.iter().map(surfaces).collect();
+    let rest = Pose::rest(Vector3::zeros());
+    let of_solids = |i: usize| solids.get(i).map_or(&[][..], Vec::as_slice);
+    // The worse one of what primitives and what solids find.
+    let worst_of = |i: usize, j: Option<usize>, a: &[Slot], b: &[Slot], bound_mm: f64| {
+        let found = worst(a, b, bound_mm);
+        let others = j.map_or(&[][..], of_solids);
+        if of_solids(i).is_empty() && others.is_empty() {
+            return found;
+        }
+        let one = Beside { solids: of_solids(i), pose: &rest, slots: a };
+        let other = Beside { solids: others, pose: &rest, slots: b };
+        one.gap(&other, found.map_or(bound(bound_mm), |f| f.0)).or(found)
+    };
     for (i, plan_i) in plans.iter().enumerate() {
         for (j, plan_j) in plans.iter().enumerate().skip(i + 1) {
             let slots = |p: &BodyPlan| p.slots.iter().map(|(_, s)| *s).collect::<Vec<_>>();
-            if let Some(s) = worst(&slots(plan_i), &slots(plan_j), input.clearance_mm) {
+            if let Some(s) = worst_of(i, Some(j), &slots(plan_i), &slots(plan_j), input.clearance_mm) {
                 let same_part = group_of(i) == group_of(j);
                 found.push(Fusion {
                     a: Member::Body(i),
@@ -75,9 +91,10 @@ pub fn fusions(
             let own_stub = |role: &Role| attached && *role == Role::Stub(f);
             let slots: Vec<Slot> = plan.slots.iter().filter(|(r, _)| !own_stub(r)).map(|(_, s)| *s).collect();
             let found_here = if attached {
-                worst(&slots, &free, 0.0).or_else(|| worst(&slots, &inner, input.clearance_mm))
+                worst_of(i, None, &slots, &free, 0.0)
+                    .or_else(|| worst_of(i, None, &slots, &inner, input.clearance_mm))
             } else {
-                worst(&slots, &whole, input.clearance_mm)
+                worst_of(i, None, &slots, &whole, input.clearance_mm)
             };
             if let Some(s) = found_here {
                 let same_part = group_of(i) == group_of(flexure.bodies.0);
@@ -108,10 +125,14 @@ pub fn fusions(
     found
 }
 
+/// Rounding of two faces that are exactly the clearance apart is no finding.
+fn bound(bound_mm: f64) -> f64 {
+    bound_mm * (1.0 - 1e-6) - 1e-6
+}
+
 /// Least gap below a bound, and its place; `None` if all stay farther apart.
 pub(super) fn worst(a: &[Slot], b: &[Slot], bound_mm: f64) -> Option<(f64, Vector3<f64>)> {
-    // Rounding of two faces that are exactly the clearance apart is no finding.
-    let mut best = (bound_mm * (1.0 - 1e-6) - 1e-6, None);
+    let mut best = (bound(bound_mm), None);
     for p in a {
         let (cp, rp) = p.bounding_sphere();
         for q in b {

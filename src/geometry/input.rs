@@ -4,10 +4,11 @@ use super::fitted::{PlateSolid, is_borne_by_motor, mounts, seats};
 use super::layers::{guides, joint_axis, layers};
 use super::parts::{BodySolid, Bore, Eye, FlexureSolid, HoleSolid, PartsInput};
 use super::slot::Facets;
+use super::solid::PlacedSolid;
 use crate::equilibrium::{Layout, Model};
 use crate::ir::{BodyId, Design, Joint, JointId, JointKind, Realization};
 use crate::rod::RodState;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Points nearer than this are the same, mm.
 const SAME_POINT_MM: f64 = 1e-6;
@@ -66,6 +67,21 @@ pub fn parts_input(design: &Design, layout: &Layout, model: &Model) -> PartsInpu
                     margin_mm: p.margin_mm,
                     origin: p.origin,
                 }),
+                solids: body
+                    .fittings
+                    .solids
+                    .iter()
+                    .map(|s| {
+                        let (pose, row) = (&layout.rest_poses[b], s.rotation);
+                        PlacedSolid {
+                            source: s.mesh.clone(),
+                            file: s.file.clone(),
+                            turn: pose.rotation * Matrix3::from_fn(|i, j| row[i][j]) * s.scale,
+                            shift: pose.point(&drawn(s.position)),
+                            origin: s.origin,
+                        }
+                    })
+                    .collect(),
                 holes: body
                     .holes
                     .iter()

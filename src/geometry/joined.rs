@@ -132,12 +132,12 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Round bars through points (mm), of the sizes that links of `like` have.
+    /// Round bars through the body's points, holes and motors (mm), of the sizes that links of `like` have.
     ///
     /// # Errors
     /// Points that are no places.
-    pub fn new(name: &str, points: &[Vector3<f64>], like: &PartsInput) -> Result<Self, GeometryError> {
-        let body = BodySolid { name: name.into(), skeleton: points.to_vec(), ..BodySolid::default() };
+    pub fn new(body: BodySolid, like: &PartsInput) -> Result<Self, GeometryError> {
+        let only_solids = body.skeleton.is_empty() && body.holes.is_empty() && body.mounts.is_empty();
         let input = PartsInput {
             bodies: vec![body],
             flexures: Vec::new(),
@@ -147,7 +147,12 @@ impl Frame {
             least_wall_mm: like.least_wall_mm,
             facets: like.facets,
         };
-        let plans = plan_bodies(&input)?;
+        let plans = if only_solids {
+            let solids = input.bodies.iter().flat_map(|b| b.solids.iter().cloned()).collect();
+            vec![BodyPlan { solids, ..BodyPlan::default() }]
+        } else {
+            plan_bodies(&input)?
+        };
         let state = MovedState { poses: vec![Pose::rest(Vector3::zeros())], flexures: Vec::new() };
         Ok(Self { input, plans, carving: Carving::default(), state })
     }
@@ -255,6 +260,7 @@ impl Placed<'_> {
             bores: plan.bores.iter().map(bore).collect(),
             plates: plan.plates.iter().map(|k| k.placed(p)).collect(),
             access: Vec::new(),
+            solids: plan.solids.iter().map(|s| s.placed(p)).collect(),
             pockets: plan.pockets.iter().map(|k| k.placed(p)).collect(),
             carried: plan.carried.iter().map(|s| s.placed(p)).collect(),
             // Told of the design that they belong to.
@@ -340,6 +346,8 @@ fn united(plans: Vec<(BodyPlan, usize)>) -> BodyPlan {
                 && (a.diameter_mm - b.diameter_mm).abs() < SAME_MM
         };
         out.bores.extend(plan.bores.into_iter().filter(|b| !known.iter().any(|k| is(k, b))));
+        let known = out.solids.clone();
+        out.solids.extend(plan.solids.into_iter().filter(|s| !known.iter().any(|k| k.is(s, SAME_MM))));
         let known = out.pockets.clone();
         out.pockets.extend(plan.pockets.into_iter().filter(|p| !known.iter().any(|k| k.is(p, SAME_MM))));
         let known = out.carried.clone();

@@ -14,6 +14,7 @@ use super::plate::Prism;
 use super::riser::Moving;
 use super::skeleton::connect;
 use super::slot::{Facets, Slot};
+use super::solid::PlacedSolid;
 use crate::diagnostic::Origin;
 use nalgebra::Vector3;
 use std::cell::OnceCell;
@@ -116,6 +117,8 @@ pub struct BodyPlan {
     pub plates: Vec<Prism>,
     /// Where screwdrivers have to reach, each with the motor and its statement.
     pub access: Vec<(Slot, String, Origin)>,
+    /// Meshes from files that are united with it.
+    pub solids: Vec<PlacedSolid>,
     /// Boxes that are cut out as well.
     pub pockets: Vec<Pocket>,
     /// Motors that it carries: not printed, but what moves must keep clear of them.
@@ -127,13 +130,13 @@ pub struct BodyPlan {
 }
 
 impl BodyPlan {
-    /// One closed mesh a slot; a plate's is that of its first one, the others have none.
+    /// One closed mesh a slot, then one a solid; a plate's is that of its first slot, the others have none.
     pub fn meshes(&self, facets: &Facets) -> Vec<Mesh> {
         let mesh = |(i, (role, slot)): (usize, &(Role, Slot))| match role {
             Role::Plate(_) => self.prism(i).map_or_else(Mesh::default, |p| p.mesh(facets)),
             _ => slot.mesh(facets, spread(i)),
         };
-        self.slots.iter().enumerate().map(mesh).collect()
+        self.slots.iter().enumerate().map(mesh).chain(self.solids.iter().map(PlacedSolid::mesh)).collect()
     }
 
     /// One closed mesh a bore, and one a pocket. The facets of a bore touch the stated circle from outside, so that a pin of
@@ -197,7 +200,7 @@ pub(crate) fn plan_body(input: &PartsInput, index: usize) -> Result<BodyPlan, Ge
     };
     let mut b = Builder {
         input,
-        plan: BodyPlan::default(),
+        plan: BodyPlan { solids: body.solids.clone(), ..BodyPlan::default() },
         moving: OnceCell::new(),
         of_flexures: OnceCell::new(),
         risen: Vec::new(),

@@ -13,6 +13,7 @@
 //! | `tidy` | removal of tiny edges before rounding to `f32` |
 //! | `union` | the boolean kernel's only client |
 //! | `mesh`, `check`, `exact`, `ray` | triangle meshes, their facts by exact arithmetic, measurements on them |
+//! | `solid`, `filled` | meshes from files as parts of links: distances, what is inside, what is wrong with them |
 //! | `weigh` | what links weigh, before anything is meshed |
 //! | `joined` | parts of several instances |
 //! | `lie` | how a part lies on the bed |
@@ -26,6 +27,7 @@ pub mod cycle;
 pub mod distance;
 pub mod exact;
 mod field;
+mod filled;
 pub mod fitted;
 pub mod gap;
 mod guide;
@@ -45,6 +47,7 @@ mod seat;
 mod section;
 pub mod skeleton;
 pub mod slot;
+pub mod solid;
 mod space;
 pub mod sweep;
 pub mod tidy;
@@ -72,4 +75,5 @@ pub use parts::{
 pub use ray::Probe;
 pub use section::{Band, bands, section};
 pub use slot::{Facets, Slot};
+pub use solid::PlacedSolid;
 pub use weigh::{has_gravity, printed_volume_and_center, weigh};

@@ -7,11 +7,12 @@
 
 use super::carve::{Carving, carve};
 use super::cycle::MovedState;
-use super::fitted::{FitFault, MountSolid, PlateSolid, SeatSolid, out_of_reach};
+use super::fitted::{FitFault, FitFaultKind, MountSolid, PlateSolid, SeatSolid, out_of_reach};
 use super::gap::{Fusion, fusions};
 use super::link::{BodyPlan, plan_body};
 use super::mesh::Mesh;
 use super::slot::Facets;
+use super::solid::PlacedSolid;
 use super::tidy::finished;
 use super::union::{BooleanError, subtract_all, union_all};
 use crate::math::Pose;
@@ -67,6 +68,8 @@ pub struct BodySolid {
     pub mounts: Vec<MountSolid>,
     /// It is a plate.
     pub plate: Option<PlateSolid>,
+    /// Meshes from files that are part of it.
+    pub solids: Vec<PlacedSolid>,
     /// Seats of motors' horns.
     pub seats: Vec<SeatSolid>,
     /// A body that a flexure's template brings along.
@@ -194,7 +197,7 @@ pub struct Parts {
     pub carving: Carving,
     /// Places where things grow together that must not.
     pub fusions: Vec<Fusion>,
-    /// Motors whose screws no driver reaches.
+    /// Motors whose screws no driver reaches, solids that do not hold on to their links.
     pub out_of_reach: Vec<FitFault>,
 }
 
@@ -269,7 +272,11 @@ fn build_planned(
 ) -> Result<Parts, GeometryError> {
     let groups = groups(input);
     let fusions = fusions(input, &plans, &groups, &carving);
-    let out_of_reach = out_of_reach(&plans, &groups);
+    let mut out_of_reach = out_of_reach(&plans, &groups);
+    for (solid, gap, at) in plans.iter().flat_map(BodyPlan::loose_solids) {
+        let (motor, kind) = (solid.file.clone(), FitFaultKind::Loose(gap));
+        out_of_reach.push(FitFault { motor, kind, at, origin: solid.origin });
+    }
     let build = |bodies: &Vec<usize>| {
         if wanted(bodies) {
             return build_part(input, &plans, &carving, bodies);

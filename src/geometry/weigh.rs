@@ -8,6 +8,7 @@
 use super::field::Field;
 use super::input::parts_input;
 use super::link::BodyPlan;
+use super::mesh::Mesh;
 use super::parts::plan_bodies;
 use super::slot::Slot;
 use crate::equilibrium::{Layout, Model, volume_and_center};
@@ -50,13 +51,20 @@ pub fn printed_volume_and_center(plan: &BodyPlan, step_mm: f64) -> (f64, Vector3
     let reach = step_mm * 1.5;
     let corner = |s: &Slot| s.extent() + Vector3::repeat(reach);
     let slots = || plan.slots.iter().map(|(_, s)| s);
-    let least = slots().map(|s| s.start.inf(&s.end) - corner(s)).reduce(|a, b| a.inf(&b));
-    let largest = slots().map(|s| s.start.sup(&s.end) + corner(s)).reduce(|a, b| a.sup(&b));
+    let solids: Vec<Mesh> = plan.solids.iter().map(|s| s.mesh()).collect();
+    let around = |low: bool| {
+        let boxes = solids.iter().filter_map(Mesh::bounding_box);
+        boxes.map(move |b| if low { b.0.add_scalar(-reach) } else { b.1.add_scalar(reach) })
+    };
+    let least = slots().map(|s| s.start.inf(&s.end) - corner(s)).chain(around(true)).reduce(|a, b| a.inf(&b));
+    let largest =
+        slots().map(|s| s.start.sup(&s.end) + corner(s)).chain(around(false)).reduce(|a, b| a.sup(&b));
     let (Some(least), Some(largest)) = (least, largest) else { return (0.0, Vector3::zeros()) };
     let mut field = Field::new(&least, &largest, step_mm, f64::INFINITY);
     // A larger body has wider steps.
     let reach = field.step * 1.5;
     slots().for_each(|s| field.add(s, 0.0, reach));
+    solids.iter().for_each(|s| field.add_mesh(s, reach));
     for bore in plan.bores.iter().map(|b| b.slot()) {
         field.near(&bore, reach, |p, value| *value = value.max(-bore.signed_distance(p)));
     }

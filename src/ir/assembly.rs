@@ -2,7 +2,9 @@
 //! assembly of one instance without a name, where it was drawn.
 
 use super::expr::{ExprGraph, Node};
-use super::{BodyId, Design, Drive, Export, JointKind, Origin, Profile, Requirement};
+use super::{
+    BodyId, Design, Drive, Export, ExprPoint, Fittings, Hole, JointKind, Origin, Profile, Requirement,
+};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -24,6 +26,9 @@ pub struct Assembly {
     pub requirements: Vec<AssemblyRequirement>,
     /// Files to emit.
     pub exports: Vec<AssemblyExport>,
+    /// Places of what is fitted to joined bodies: constants.
+    #[serde(default)]
+    pub exprs: ExprGraph,
     /// The declaration.
     pub origin: Origin,
 }
@@ -74,6 +79,12 @@ pub struct Joined {
     /// What the body itself reaches in the assembly, mm: joined by bars, beside the members' own shapes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub skeleton: Vec<[f64; 3]>,
+    /// Holes that it has in the assembly, their places in [`Assembly::exprs`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub holes: Vec<Hole>,
+    /// Motors and meshes that it carries in the assembly, likewise.
+    #[serde(default, skip_serializing_if = "Fittings::is_empty")]
+    pub fittings: Fittings,
     /// The first statement that joins them.
     pub origin: Origin,
 }
@@ -174,7 +185,19 @@ impl Instance {
     }
 }
 
+impl Joined {
+    /// Whether it has something of its own, besides what its members are.
+    pub fn has_own(&self) -> bool {
+        !(self.skeleton.is_empty() && self.holes.is_empty() && self.fittings.is_empty())
+    }
+}
+
 impl Assembly {
+    /// The place of something that is fitted to a joined body, mm.
+    pub fn place(&self, p: ExprPoint) -> Vector3<f64> {
+        Vector3::from(p.map(|id| self.exprs.as_constant(id).unwrap_or(f64::NAN)))
+    }
+
     /// A mechanism by itself.
     pub fn of(design: Design) -> Self {
         let motors = (0..design.drives.len()).map(|drive| InstanceDrive { instance: 0, drive }).collect();
@@ -192,6 +215,7 @@ impl Assembly {
             joined: Vec::new(),
             motors,
             requirements: Vec::new(),
+            exprs: ExprGraph::default(),
             exports: design.exports.iter().map(export).collect(),
             origin: design.origin,
             designs: vec![design],

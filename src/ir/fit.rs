@@ -1,6 +1,6 @@
 //! What is fitted to bodies when a printed part becomes a machine: motors, their horns, and plates.
 
-use super::{ExprPoint, JointId, Origin};
+use super::{AddedSolid, ExprPoint, JointId, Origin};
 use serde::{Deserialize, Serialize};
 
 /// What is fitted to a body.
@@ -15,12 +15,15 @@ pub struct Fittings {
     /// It is made as a plate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plate: Option<LinkPlate>,
+    /// Meshes from files that are part of it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub solids: Vec<AddedSolid>,
 }
 
 impl Fittings {
     /// Whether nothing is fitted.
     pub fn is_empty(&self) -> bool {
-        self.mounts.is_empty() && self.horns.is_empty() && self.plate.is_none()
+        self.mounts.is_empty() && self.horns.is_empty() && self.plate.is_none() && self.solids.is_empty()
     }
 }
 

@@ -9,6 +9,7 @@ pub mod expr;
 mod fit;
 mod load;
 mod model;
+mod solid;
 mod solution;
 
 pub use crate::diagnostic::Origin;
@@ -21,6 +22,7 @@ pub use fit::{Fittings, Horn, HornForm, LinkPlate, MotorBody, MotorScrews, Mount
 pub use load::{Load, LoadCase, LoadKind};
 pub use model::RodModel;
 use serde::{Deserialize, Serialize};
+pub use solid::{AddedSolid, SurfaceFault, SurfaceFaultKind, TriangleMesh};
 pub use solution::Solution;
 
 /// Index into [`Design::bodies`].

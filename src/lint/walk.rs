@@ -81,6 +81,10 @@ pub fn expressions<'a>(s: &'a Statement, f: &mut dyn FnMut(&'a Expr)) {
             f(&p.thickness);
             p.margin.iter().for_each(f);
         }
+        K::Solid(s) => {
+            s.point.iter().chain(&s.scale).for_each(&mut *f);
+            s.turned.iter().for_each(|(angle, axis)| [angle, axis].into_iter().for_each(&mut *f));
+        }
         K::Rod(r) => {
             for end in [&r.from, &r.to] {
                 f(&end.position);

@@ -2,9 +2,10 @@
 
 use super::edits::smallest;
 use crate::diagnostic::{Diagnostic, Fix, SourceMap, apply};
-use crate::elaborate::{FileError, Files, Options, elaborate};
+use crate::elaborate::{FileError, Files, Options, SolidFile, elaborate};
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Replacements by file, as the source map calls them, in order.
 pub(super) type Edits = BTreeMap<String, Vec<(Range<usize>, String)>>;
@@ -69,5 +70,9 @@ pub(super) struct Overlay<'a> {
 impl Files for Overlay<'_> {
     fn read(&self, path: &str) -> Result<String, FileError> {
         self.new.get(path).cloned().map_or_else(|| self.below.read(path), Ok)
+    }
+
+    fn solid(&self, path: &str) -> Result<Arc<SolidFile>, FileError> {
+        self.below.solid(path)
     }
 }

@@ -29,7 +29,7 @@ pub mod tokens;
 mod uri;
 mod vocabulary;
 
-use crate::elaborate::FileError;
+use crate::elaborate::{FileError, SolidFile};
 use crate::lint::Levels;
 pub use running::Event;
 pub use solver::solve;
@@ -42,6 +42,14 @@ pub trait Host: Send + Sync {
     /// # Errors
     /// Why it could not be read.
     fn read(&self, folder: &str, path: &str) -> Result<String, FileError>;
+
+    /// The file of a solid, likewise; kept while it is the same, since every key asks for it.
+    ///
+    /// # Errors
+    /// Why it could not be read.
+    fn solid(&self, folder: &str, path: &str) -> Result<Arc<SolidFile>, FileError> {
+        self.read(folder, path).map(|text| Arc::new(SolidFile::new(text.into_bytes())))
+    }
 
     /// `.mech` files of a folder and its folders, absolute, sorted.
     fn list(&self, folder: &str) -> Vec<String>;

@@ -10,7 +10,7 @@ use super::running::{Client, Running};
 use super::space::Space;
 use super::text::{Lines, change};
 use super::{Host, commands, requests, uri};
-use crate::elaborate::{FileError, Files};
+use crate::elaborate::{FileError, Files, SolidFile};
 pub use lsp_server::Connection;
 use lsp_server::{ErrorCode, Message, Notification, Request, RequestId, Response};
 use lsp_types as lsp;
@@ -45,6 +45,10 @@ impl Files for Below<'_> {
             Some(text) => Ok(text.to_string()),
             None => self.texts.host.read(self.folder, path),
         }
+    }
+
+    fn solid(&self, path: &str) -> Result<Arc<SolidFile>, FileError> {
+        self.texts.host.solid(self.folder, path)
     }
 }
 

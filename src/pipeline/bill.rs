@@ -70,6 +70,15 @@ pub fn bought(assembly: &Assembly) -> Vec<Bought> {
             bill.add("string".into(), 1, instance.of(&string.name));
         }
     }
+    for joined in &assembly.joined {
+        let first = joined.members.first().and_then(|(i, _)| assembly.instances.get(*i));
+        let Some(design) = first.and_then(|i| assembly.designs.get(i.design)) else { continue };
+        for mount in &joined.fittings.mounts {
+            if is_new(format!("mount {}", mount.motor.name), assembly.place(mount.position)) {
+                mounted(&mut bill, design, mount, joined.name.clone());
+            }
+        }
+    }
     let told =
         |(name, count, of): (String, usize, Vec<String>)| Bought { count, name, purpose: of.join(", ") };
     bill.0.into_iter().map(told).collect()

@@ -73,6 +73,7 @@ impl Stages for Compiler {
     }
 
     fn rigid(&self, design: &Design, values: &[f64]) -> Result<Simulation, Failed> {
+        solids::closed(design)?;
         let motion = solve_motion(design, values)?;
         let states = motion
             .states

@@ -6,12 +6,13 @@ use crate::diagnostic::{Diagnostic, Origin};
 use crate::geometry::joined::{Frame, Share, Whole, join};
 use crate::geometry::link::BodyPlan;
 use crate::geometry::{
-    Carving, Fusion, GeometryError, LeastGap, Member, Mesh, MovedState, Part, Parts, PartsInput,
-    carved_cycle_gaps, parts::groups,
+    BodySolid, Carving, Fusion, GeometryError, LeastGap, Member, Mesh, MountSolid, MovedState, Part, Parts,
+    PartsInput, PlacedSolid, carved_cycle_gaps,
+    parts::{HoleSolid, groups},
 };
 use crate::ir::assembly::Joined;
 use crate::ir::{Assembly, Instance};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// A design in solids.
 pub struct Solid {
@@ -118,7 +119,7 @@ pub fn parts(assembly: &Assembly, solids: &[Solid]) -> Result<(Vec<Printed>, Vec
     };
     let known: Vec<Known<'_>> = solids.iter().map(Solid::known).collect();
     let whole = joined(assembly, &known).map_err(failed(&assembly.name, assembly.origin))?;
-    let (mut out, mut found) = (Vec::new(), Vec::new());
+    let (mut out, mut found) = (Vec::new(), seats(assembly, &known));
     for group in whole.groups() {
         let Some((name, at)) = name(assembly, solids, &whole, &group) else { continue };
         // Repeated instances are named with brackets, which shells and some slicers take for patterns.
@@ -179,20 +180,92 @@ fn joined(assembly: &Assembly, designs: &[Known<'_>]) -> Result<Whole, GeometryE
     let states = shares.iter().map(|s| s.states.len()).min().unwrap_or(0);
     let mut frames = Vec::new();
     for joined in own(assembly) {
-        let first = joined.members.first().and_then(|(i, _)| assembly.instances.get(*i));
-        let like = first.and_then(|i| designs.get(i.design));
         let body = known.iter().find(|k| assembly.joined.get(k.0) == Some(joined)).map(|k| k.1);
-        let (Some(like), Some(body)) = (like, body) else { continue };
-        let points: Vec<Vector3<f64>> = joined.skeleton.iter().map(|p| Vector3::from(*p)).collect();
-        frames.push((Frame::new(&joined.name, &points, like.input)?, body));
+        if let (Some(frame), Some(body)) = (frame(assembly, joined, designs), body) {
+            frames.push((frame?, body));
+        }
     }
     shares.extend(frames.iter().map(|(frame, body)| frame.share(*body, states)));
     join(&shares)
 }
 
-/// The bodies of the assembly that have points of their own, in the order of their shares after the instances'.
+/// What a joined body has of its own, planned; none: nothing is known of its members.
+fn frame(
+    assembly: &Assembly,
+    joined: &Joined,
+    designs: &[Known<'_>],
+) -> Option<Result<Frame, GeometryError>> {
+    let of = |i: usize| assembly.instances.get(i).and_then(|n| Some((n, designs.get(n.design)?)));
+    let (_, like) = joined.members.first().and_then(|(i, _)| of(*i))?;
+    let skeleton: Vec<Vector3<f64>> = joined.skeleton.iter().map(|p| Vector3::from(*p)).collect();
+    let holes: Vec<HoleSolid> = joined
+        .holes
+        .iter()
+        .map(|h| HoleSolid {
+            point: assembly.place(h.position),
+            axis: Vector3::from(h.axis),
+            diameter_mm: h.diameter_mm,
+        })
+        .collect();
+    // Without points of its own, what is fitted is joined to the nearest place of the members.
+    let nearest = |at: &Vector3<f64>| {
+        let plans = joined.members.iter().filter_map(|(i, b)| {
+            let (instance, known) = of(*i)?;
+            Some((instance.placement, known.plans.get(*b)?))
+        });
+        let places = plans.flat_map(|(p, plan)| {
+            plan.slots.iter().flat_map(move |(_, s)| [p.point(&s.start), p.point(&s.end)])
+        });
+        places.min_by(|p, q| (p - at).norm().total_cmp(&(q - at).norm()))
+    };
+    let rest = |at: &Vector3<f64>| match skeleton.len() {
+        0 => nearest(at).unwrap_or(*at),
+        n => skeleton.iter().sum::<Vector3<f64>>() / n as f64,
+    };
+    let sizes = [like.input.height_mm, like.input.clearance_mm];
+    let mount = |m: &crate::ir::Mount| {
+        let at = assembly.place(m.position);
+        MountSolid::standing(m, at, m.toward.map(|q| assembly.place(q)), rest(&at), sizes)
+    };
+    let mounts: Vec<MountSolid> = joined.fittings.mounts.iter().map(mount).collect();
+    let solids = joined.fittings.solids.iter().map(|s| PlacedSolid {
+        source: s.mesh.clone(),
+        file: s.file.clone(),
+        turn: Matrix3::from_fn(|i, j| s.rotation[i][j]) * s.scale,
+        shift: assembly.place(s.position),
+        origin: s.origin,
+    });
+    let fitted = holes.iter().map(|h| h.point).chain(mounts.iter().map(|m| m.point));
+    let ties: Vec<Vector3<f64>> =
+        if skeleton.is_empty() { fitted.filter_map(|p| nearest(&p)).collect() } else { Vec::new() };
+    let body = BodySolid {
+        name: joined.name.clone(),
+        skeleton: skeleton.iter().copied().chain(ties).collect(),
+        holes,
+        mounts,
+        solids: solids.collect(),
+        ..BodySolid::default()
+    };
+    Some(Frame::new(body, like.input))
+}
+
+/// What is wrong with motors on bodies of the assembly's own.
+fn seats(assembly: &Assembly, designs: &[Known<'_>]) -> Vec<Diagnostic> {
+    let mut found = Vec::new();
+    for joined in own(assembly) {
+        let first = joined.members.first().and_then(|(i, _)| assembly.instances.get(*i));
+        let design = first.and_then(|i| assembly.designs.get(i.design));
+        if let (Some(design), Some(Ok(frame))) = (design, frame(assembly, joined, designs)) {
+            let faults = frame.plans.iter().flat_map(|p| &p.faults);
+            found.extend(faults.map(|f| super::solids::fit_fault(design, f)));
+        }
+    }
+    found
+}
+
+/// The bodies of the assembly that have something of their own, in the order of their shares after the instances'.
 fn own(assembly: &Assembly) -> impl Iterator<Item = &Joined> {
-    assembly.joined.iter().filter(|j| !j.skeleton.is_empty() && !j.members.is_empty())
+    assembly.joined.iter().filter(|j| j.has_own() && !j.members.is_empty())
 }
 
 /// The group of common bodies that a body belongs to.
@@ -204,7 +277,7 @@ fn joint_body(assembly: &Assembly, instance: usize, body: usize) -> Option<usize
 pub fn stands_alone(assembly: &Assembly, design: usize, bodies: &[usize]) -> bool {
     let common = |i: usize, b: usize| {
         let joined = joint_body(assembly, i, b).and_then(|j| assembly.joined.get(j));
-        joined.is_some_and(|j| j.members.len() > 1 || !j.skeleton.is_empty())
+        joined.is_some_and(|j| j.members.len() > 1 || j.has_own())
     };
     let of_design = |(_, n): &(usize, &Instance)| n.design == design;
     let mut instances = assembly.instances.iter().enumerate().filter(of_design);

@@ -41,7 +41,7 @@ pub use stability::{DriveValues, LimitPoint, RestState, SnapThrough, Stability};
 pub use stages::{Between, Checked, Failed, Made, NothingMade, Parts, Response, Simulation, Solved, Stages};
 
 use crate::diagnostic::{Diagnostic, Severity};
-pub use crate::elaborate::{FileError, Files};
+pub use crate::elaborate::{FileError, Files, MOST_SOLID_BYTES, SolidFile};
 use crate::emit::lock::{Lock, LockState};
 use crate::ir::{Assembly, Design, Solution};
 use crate::lint::{Levels, Stage as Reached};
@@ -338,6 +338,7 @@ fn proved(assembly: &Assembly, stages: &dyn Stages, out: &mut BuildOutcome) -> O
     let told = out.diagnostics.len();
     lints::text(assembly, out);
     let mut motions = Vec::new();
+    keep(solids::all_closed(assembly), &mut out.diagnostics)?;
     for design in &assembly.designs {
         let rigid = keep(stages.rigid(design, &starts(design)), &mut out.diagnostics)?;
         tell_once(rigid.diagnostics, out);

@@ -10,7 +10,7 @@ use crate::geometry::{
     Carving, Cut, CycleGaps, FitFault, FitFaultKind, Fusion, GeometryError, LeastGap, Member, MovedState,
     Parts, build_wanted_parts, carve, carved_cycle_gaps, flexure_solid, parts_input, plan_bodies,
 };
-use crate::ir::{Design, Joint, JointKind};
+use crate::ir::{AddedSolid, Assembly, Design, Joint, JointKind, SurfaceFault, SurfaceFaultKind};
 
 /// Builds the printed parts of a design in its rest pose; links make way for their own flexures in the `states` of the
 /// cycle. Meshed is only what is `wanted`, by the bodies of a part.
@@ -32,7 +32,7 @@ pub fn build(
     Ok((parts, found))
 }
 
-fn fit_fault(design: &Design, fault: &FitFault) -> Diagnostic {
+pub(super) fn fit_fault(design: &Design, fault: &FitFault) -> Diagnostic {
     let (p, motor, process) = (fault.at, &fault.motor, &design.process);
     let near = format!("near ({:.1}, {:.1}, {:.1}) mm of the rest pose", p.x, p.y, p.z);
     match fault.kind {
@@ -56,6 +56,12 @@ fn fit_fault(design: &Design, fault: &FitFault) -> Diagnostic {
                 .label("it is made of round bars in space")
                 .help("a plate needs a body whose hinges have one direction, with its points at one height")
         }
+        FitFaultKind::Loose(gap) => {
+            let message = format!("`{motor}` does not touch its link, and would be a part of its own");
+            Diagnostic::error("E0655", message, fault.origin)
+                .label(format!("the rest of the link is {gap:.2} mm away, {near}"))
+                .help("move it with `at`, turn it with `turned`, or give the link a point inside of it")
+        }
         FitFaultKind::InTheWay => {
             let message = format!("`{motor}` stands where its own link holds something else");
             Diagnostic::warning("W0649", message, fault.origin)
@@ -63,6 +69,46 @@ fn fit_fault(design: &Design, fault: &FitFault) -> Diagnostic {
                 .help("turn the motor with `toward`, or move the link's points away from it")
         }
     }
+}
+
+/// Whether every solid's file bounds one.
+///
+/// # Errors
+/// What is wrong with which, where and how often.
+pub fn closed(design: &Design) -> Result<(), Failed> {
+    bounding(design.bodies.iter().flat_map(|b| &b.fittings.solids))
+}
+
+/// The same of what is fitted to joined bodies.
+///
+/// # Errors
+/// As [`closed`].
+pub fn all_closed(assembly: &Assembly) -> Result<(), Failed> {
+    bounding(assembly.joined.iter().flat_map(|j| &j.fittings.solids))
+}
+
+fn bounding<'s>(solids: impl Iterator<Item = &'s AddedSolid>) -> Result<(), Failed> {
+    let told = |solid: &AddedSolid| {
+        let faults = crate::geometry::solid::faults(&solid.mesh);
+        let first = faults.first()?;
+        let what = |f: &SurfaceFault| {
+            let (n, [x, y, z]) = (f.count, f.at);
+            let what = match f.kind {
+                SurfaceFaultKind::Open => "edges have one triangle only: there is a hole",
+                SurfaceFaultKind::NoSides => "edges have triangles that do not agree about what is outside",
+                SurfaceFaultKind::Crossing => "pairs of triangles cross",
+            };
+            format!("{n} {what}; the first near ({x:.2}, {y:.2}, {z:.2}) mm of the file")
+        };
+        let message = format!("the surface of `{}` bounds no solid", solid.file);
+        let mut found = Diagnostic::error("E0465", message, solid.origin).label(what(first));
+        for more in faults.iter().skip(1) {
+            found = found.also(solid.origin, what(more));
+        }
+        Some(found.help("let a mesh program repair it (close holes, unite shells), or export it anew"))
+    };
+    let found: Vec<Diagnostic> = solids.filter_map(told).collect();
+    if found.is_empty() { Ok(()) } else { Err(found) }
 }
 
 /// Whether every body has something to be made of. A design without equilibrium is not judged here.

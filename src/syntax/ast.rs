@@ -251,6 +251,8 @@ pub enum StatementKind {
     Horn(Box<Fitted>),
     /// `plate THICKNESS on BODY [margin M]`
     Plate(Box<Plate>),
+    /// `solid "FILE" on BODY [at P] [turned A about D]… [scale = K]`
+    Solid(Box<Solid>),
     /// `rod NAME { [axis second] from a at … along … to b at … along … section … }` (templates only)
     Rod(Box<Rod>),
     /// `place NAME = MECHANISM [{ overrides }] at P [turned A about D] [scale = K] [merging GROUND into BODY]…`
@@ -323,6 +325,21 @@ pub struct Plate {
     pub body: Ident,
     /// How far it reaches beyond what it carries.
     pub margin: Option<Expr>,
+}
+
+/// A mesh from a file that becomes part of a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solid {
+    /// Path of the file, from the folder of the design.
+    pub file: At<String>,
+    /// The body.
+    pub body: Ident,
+    /// Where the file's origin is put.
+    pub point: Option<Expr>,
+    /// Turns by an angle about a direction, in their order.
+    pub turned: Vec<(Expr, Expr)>,
+    /// By what its lengths are multiplied.
+    pub scale: Option<Expr>,
 }
 
 /// A hole through a body.

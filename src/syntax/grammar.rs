@@ -317,6 +317,8 @@ fn kind(rule: Rule) -> Kind {
         Rule::st_mount => Kind::Mount,
         Rule::st_horn => Kind::Horn,
         Rule::st_plate => Kind::Plate,
+        Rule::st_solid => Kind::Solid,
+        Rule::solid_at => Kind::At,
         Rule::fit_clause | Rule::seat_clause => Kind::Fitted,
         Rule::load_gravity => Kind::Gravity,
         Rule::load_moment => Kind::Moment,

@@ -1,7 +1,7 @@
 //! Statements: concrete tree to [`ast::StatementKind`].
 
 use super::ast::{
-    Allow, At, Cable, Compare, Expr, Fitted, Hole, Ident, Joint, Load, Plate, Profile, Rod, RodEnd,
+    Allow, At, Cable, Compare, Expr, Fitted, Hole, Ident, Joint, Load, Plate, Profile, Rod, RodEnd, Solid,
     Statement, StatementKind, TemplateUse, Term,
 };
 use super::lower::Lower;
@@ -89,16 +89,17 @@ impl Lower<'_> {
             Kind::Hole => {
                 let mut values = self.values(node).into_iter();
                 let (diameter, point) = (values.next()?, values.next()?);
-                let hole = Hole { diameter, body: self.ident(node)?, point, along: values.next() };
+                let hole = Hole { diameter, body: self.body_ref(node, 0)?, point, along: values.next() };
                 StatementKind::Hole(Box::new(hole))
             }
             Kind::Mount => StatementKind::Mount(Box::new(self.fitted(node)?)),
             Kind::Horn => StatementKind::Horn(Box::new(self.fitted(node)?)),
             Kind::Plate => {
                 let mut values = self.values(node).into_iter();
-                let (thickness, body) = (values.next()?, self.ident(node)?);
+                let (thickness, body) = (values.next()?, self.body_ref(node, 0)?);
                 StatementKind::Plate(Box::new(Plate { thickness, body, margin: values.next() }))
             }
+            Kind::Solid => StatementKind::Solid(Box::new(self.solid(node)?)),
             Kind::Allow => StatementKind::Allow(self.allow(node)?),
             Kind::Assert => StatementKind::Assert(Box::new(self.assertion(node)?)),
             Kind::Variant => StatementKind::Variant(Box::new(self.variant(node)?)),
@@ -113,17 +114,50 @@ impl Lower<'_> {
         node.all(Kind::Value).map(|n| self.expr(n)).collect()
     }
 
-    fn fitted(&mut self, node: &Node) -> Option<Fitted> {
-        let mut names = self.idents(node).into_iter();
-        let (motor, mut body) = (names.next()?, names.next()?);
+    /// A body, or one of an instance, after so many other names.
+    fn body_ref(&mut self, node: &Node, before: usize) -> Option<Ident> {
+        let mut names = self.indexed(node).into_iter().skip(before);
+        let mut body = names.next()?;
         if let Some(inner) = names.next() {
             body.node = format!("{}.{}", body.node, inner.node);
             body.at.end = inner.at.end;
         }
+        Some(body)
+    }
+
+    fn fitted(&mut self, node: &Node) -> Option<Fitted> {
+        let (motor, body) = (self.ident(node)?, self.body_ref(node, 1)?);
         let point = self.value(node)?;
         let clause = |c: &Node| Some((self.named(c.first(Kind::Keyword)?), self.value(c)?));
         let clauses = node.all(Kind::Fitted).filter_map(clause).collect();
         Some(Fitted { motor, body, point, clauses })
+    }
+
+    fn solid(&mut self, node: &Node) -> Option<Solid> {
+        let text = node.first(Kind::Text)?;
+        let file = At { node: self.quoted(text), at: self.origin(text) };
+        let body = self.body_ref(node, 0)?;
+        let mut solid = Solid { file, body, point: None, turned: Vec::new(), scale: None };
+        let mut seen: Vec<(Kind, Origin)> = Vec::new();
+        for clause in node.parts() {
+            let kind = clause.kind;
+            let once = matches!(kind, Kind::At | Kind::Scaled);
+            if let Some((_, first)) = seen.iter().find(|(k, _)| once && *k == kind).copied() {
+                self.twice(clause, first);
+                continue;
+            }
+            seen.push((kind, self.origin(clause)));
+            match kind {
+                Kind::At => solid.point = self.value(clause),
+                Kind::Turned => {
+                    let mut values = self.values(clause).into_iter();
+                    solid.turned.extend(values.next().zip(values.next()));
+                }
+                Kind::Scaled => solid.scale = self.value(clause),
+                _ => {}
+            }
+        }
+        Some(solid)
     }
 
     fn joint(&mut self, node: &Node) -> Option<Joint> {

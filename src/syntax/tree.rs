@@ -101,6 +101,9 @@ pub enum Kind {
     Mount,
     Horn,
     Plate,
+    Solid,
+    /// The place of a solid.
+    At,
     /// A clause of a mount or a horn.
     Fitted,
     Gravity,

@@ -57,7 +57,7 @@ pub(super) const STATEMENT_WORDS: &[&str] = &[
 ];
 
 /// Those of [`STATEMENT_WORDS`] whose statements a later version will understand.
-const LATER_WORDS: &[&str] = &["fatigue", "solid", "spring", "stop", "sweep", "tolerance"];
+const LATER_WORDS: &[&str] = &["fatigue", "spring", "stop", "sweep", "tolerance"];
 
 /// Words that can start a line in a block of a kind, or at the top of a file for [`Kind::File`].
 pub(super) fn starting(block: Kind) -> Vec<&'static str> {
@@ -139,6 +139,7 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         "mount" => "mount MOTOR on BODY at POINT",
         "horn" => "horn MOTOR on BODY at POINT",
         "plate" => "plate THICKNESS on BODY",
+        "solid" => "solid \"FILE.stl\" on BODY at POINT",
         "load" => "load FORCE along DIRECTION on BODY at POINT",
         _ => return None,
     })

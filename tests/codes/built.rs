@@ -38,6 +38,23 @@ fn short(edits: &[(&str, &str)]) -> String {
     changed(&all)
 }
 
+/// A block from a file on the coupler, without some of its triangles.
+fn with_solid(place: &str, missing: usize) -> Vec<String> {
+    let text = short(&[(
+        "    material rigur",
+        &format!("    solid \"block.stl\" on coupler {place}\n    material rigur"),
+    )]);
+    let block = include_str!("../elaborate/errors/solids/block.stl");
+    let facets: Vec<&str> = block.split_inclusive("endfacet\n").collect();
+    let block = format!("solid block\n{}", facets[1 + missing..].concat());
+    let whole = if missing == 0 { include_str!("../elaborate/errors/solids/block.stl") } else { &block };
+    let mut files = files(&text);
+    files.insert("block.stl".into(), whole.into());
+    let request = Request { source: "main.mech".into(), ..Request::default() };
+    let compiler = Compiler { iterations: 0, ..Compiler::default() };
+    all(&pipeline::build(&request, &compiler, &files, &common::NoClock, &AtomicBool::new(false)))
+}
+
 /// A process of the design's own, `print on small`.
 fn on(fields: &str) -> String {
     let text = short(&[("print on polyjet", "print on small"), ("use std.processes.polyjet\n", "")]);
@@ -185,6 +202,8 @@ type Find = fn() -> Vec<String>;
 pub fn cases() -> Vec<(&'static str, Find)> {
     let lazy = |find: Find| find;
     vec![
+        ("E0465", lazy(|| with_solid("at P", 1))),
+        ("E0655", lazy(|| with_solid("at P + (0 mm, 0 mm, 80 mm)", 0))),
         ("W0506", lazy(|| moved(&parallelogram("track(tip)", 11)))),
         ("W0507", lazy(|| moved(KITE))),
         ("E0612", lazy(|| at_start(&parallelogram("track(tip)", 12)))),

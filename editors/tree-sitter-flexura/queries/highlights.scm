@@ -7,8 +7,8 @@
   "rest" "at" "trace" "minimize" "weight" "require" "export" "rod" "along" "section" "keys" "linear" "smooth" "and"
   "output" "target" "about" "direction" "axis" "layer" "pin" "into" "toward" "as" "free" "body" "first" "second"
   "place" "turned" "scale" "merging" "mirror" "across" "sharing" "load" "gravity" "hole" "moment" "workspace" "allow"
-  "string" "via" "assert" "variant" "for" "case" "mount" "horn" "plate" "thick" "clearance" "deep" "margin"
-  "fatigue" "solid" "spring" "stop" "sweep" "tolerance"
+  "string" "via" "assert" "variant" "for" "case" "mount" "horn" "plate" "solid" "thick" "clearance" "deep" "margin"
+  "fatigue" "spring" "stop" "sweep" "tolerance"
 ] @keyword
 (cycle "in" @keyword)
 (for "in" @keyword)

@@ -2,11 +2,11 @@
 //! meanwhile, and what was read is what is watched.
 
 use super::super::sources::{self, Folder};
-use flexura::pipeline::{FileError, Files};
+use flexura::pipeline::{FileError, Files, SolidFile};
 use sha2::Digest;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// A file that a run depends on, with the digest of what was read; none: it was not there or not to be read.
 pub type Input = (PathBuf, Option<Vec<u8>>);
@@ -15,12 +15,16 @@ pub type Input = (PathBuf, Option<Vec<u8>>);
 pub struct Snapshot {
     folder: Folder,
     texts: Mutex<BTreeMap<String, Result<String, FileError>>>,
+    solids: Mutex<BTreeMap<String, Solid>>,
 }
+
+/// A solid's file, with the digest by which its change is noticed.
+type Solid = (Result<Arc<SolidFile>, FileError>, Option<Vec<u8>>);
 
 impl Snapshot {
     /// Of a folder, nothing read yet.
     pub fn of(folder: Folder) -> Self {
-        Self { folder, texts: Mutex::default() }
+        Self { folder, texts: Mutex::default(), solids: Mutex::default() }
     }
 
     /// What has been read.
@@ -35,7 +39,9 @@ impl Snapshot {
             };
             (path, digest)
         };
-        texts.iter().map(input).collect()
+        let solids = self.solids.lock().unwrap_or_else(PoisonError::into_inner);
+        let solids = solids.iter().map(|(name, (_, digest))| (self.folder.root().join(name), digest.clone()));
+        texts.iter().map(input).chain(solids).collect()
     }
 }
 
@@ -43,6 +49,16 @@ impl Files for Snapshot {
     fn read(&self, path: &str) -> Result<String, FileError> {
         let mut texts = self.texts.lock().unwrap_or_else(PoisonError::into_inner);
         texts.entry(path.to_string()).or_insert_with(|| self.folder.read(path)).clone()
+    }
+
+    fn solid(&self, path: &str) -> Result<Arc<SolidFile>, FileError> {
+        let mut solids = self.solids.lock().unwrap_or_else(PoisonError::into_inner);
+        let read = || {
+            // A file that changes meanwhile differs from this digest, and is read once more.
+            let digest = sources::digest_of(&self.folder.root().join(path));
+            (self.folder.solid(path), digest)
+        };
+        solids.entry(path.to_string()).or_insert_with(read).0.clone()
     }
 }
 

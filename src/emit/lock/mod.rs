@@ -150,10 +150,15 @@ pub fn design_digest(design: &Design) -> String {
         // Motors and plates change the form of links; only weight and what keeps links apart ask for that.
         let apart = design.all_objectives().any(|o| matches!(o.kind, ObjectiveKind::Collision { .. }));
         let weighed = design.all_loads().any(|l| matches!(l.kind, LoadKind::Gravity { .. }));
-        if !apart && !weighed {
+        if !weighed {
             for body in fields.get_mut("bodies").and_then(Value::as_array_mut).into_iter().flatten() {
-                if let Value::Object(body) = body {
-                    body.remove("fittings");
+                let Value::Object(body) = body else { continue };
+                // What keeps links apart sees primitives only.
+                if let Some(Value::Object(fittings)) = body.get_mut("fittings") {
+                    fittings.remove("solids");
+                    if !apart || fittings.is_empty() {
+                        body.remove("fittings");
+                    }
                 }
             }
         }
