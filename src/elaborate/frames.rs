@@ -7,6 +7,7 @@ use super::sheet::Sheet;
 use super::structure::{SAME_POINT_MM, Structure};
 use crate::diagnostic::Diagnostic;
 use crate::ir::{ExprPoint, Joint, JointKind, Layers};
+use crate::syntax::ast::{self, Expr};
 
 /// Height of a link where the text is silent, mm.
 const DEFAULT_HEIGHT_MM: f64 = 12.0;
@@ -151,6 +152,29 @@ impl<'a> Evaluator<'a> {
             );
         }
         Ok(Layers { height_mm, pitch_mm: height_mm + clearance_mm.unwrap_or(0.0), axis })
+    }
+
+    /// Radius of fillets, mm; 0 where not given. It grows with `scale`, as thickness does.
+    pub(super) fn fillet(&mut self, scope: usize, text: Option<&'a Expr>) -> Outcome<f64> {
+        let Some(e) = text else { return Ok(0.0) };
+        let radius = self.eval_fixed(scope, e, Dimension::LENGTH, "the radius of a fillet")?;
+        if radius < 0.0 {
+            return self.fail(
+                Diagnostic::error(codes::SIZE, "the radius of a fillet must not be negative", e.at)
+                    .help("`fillet 0 mm` is none"),
+            );
+        }
+        Ok(radius)
+    }
+
+    /// A joint without flexures has nothing to round.
+    pub(super) fn no_fillet(&mut self, text: &ast::Joint) {
+        if let Some(e) = &text.fillet {
+            self.out.push(
+                Diagnostic::error(codes::MISPLACED, "only a compliant joint has fillets", e.at)
+                    .help("leave out `fillet`, or make the joint of a flexure with `as …`"),
+            );
+        }
     }
 
     /// Least distance, over the bodies of a joint, from the joint's point to the body's nearest other

@@ -7,6 +7,7 @@
 
 use super::carve::{Carving, carve};
 use super::cycle::MovedState;
+use super::fillet::Fillet;
 use super::fitted::{FitFault, MountSolid, PlateSolid, SeatSolid, out_of_reach};
 use super::gap::{Fusion, fusions};
 use super::link::{BodyPlan, plan_body};
@@ -166,6 +167,8 @@ pub struct FlexureSolid {
     pub a_mm: Vec<f64>,
     /// Semi-axis along m₂ at each station.
     pub b_mm: Vec<f64>,
+    /// Fillets at its start and at its end.
+    pub fillets: [Option<Fillet>; 2],
 }
 
 /// A part to print.
