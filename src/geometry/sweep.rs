@@ -18,6 +18,8 @@ const LARGEST_STEP_MM: f64 = 0.8;
 
 /// Stations nearer to each other than this are one, mm.
 const SAME_STATION_MM: f64 = 0.05;
+/// A fillet of a flat section has its full size where the section has this part of its thickness.
+const FLARE_FROM: f64 = 0.3;
 
 /// One section of the swept solid.
 #[derive(Clone, Copy, Debug)]
@@ -27,6 +29,8 @@ struct Station {
     m2: Vector3<f64>,
     a: f64,
     b: f64,
+    /// By how much a fillet moves both faces outwards, mm.
+    flare: f64,
 }
 
 impl FlexureSolid {
@@ -123,7 +127,21 @@ impl FlexureSolid {
     /// multiple of 4, so that both axes end in vertices and the mesh is exactly as thick as the design
     /// (64 facets: 0.16 % less area). A rectangle has its four corners.
     pub fn mesh(&self, facets: usize) -> Mesh {
-        let stations = self.stations();
+        self.swept(&self.stations(), facets)
+    }
+
+    /// What the fillet of an end adds to its link: the root, closed where the fillet begins; none without a fillet.
+    pub fn root_mesh(&self, at_end: bool, facets: usize) -> Option<Mesh> {
+        self.fillets[usize::from(at_end)]?;
+        let (_, [head, tail]) = self.pieces();
+        let mut root = if at_end { tail } else { head };
+        if !at_end {
+            root.reverse();
+        }
+        Some(self.swept(&root, facets))
+    }
+
+    fn swept(&self, stations: &[Station], facets: usize) -> Mesh {
         let boundary: Vec<(f64, f64)> = match self.section {
             SectionShape::Ellipse => {
                 let n = (facets / 4).max(2) * 4;
@@ -134,9 +152,11 @@ impl FlexureSolid {
         };
         let n = boundary.len();
         let mut mesh = Mesh::default();
-        for s in &stations {
+        for s in stations {
             for (x, y) in &boundary {
-                mesh.vertices.push(s.center + s.m1 * (s.a * x) + s.m2 * (s.b * y));
+                // The rim of an ellipse stays an edge.
+                let flare = s.flare * (x.abs() / FLARE_FROM).min(1.0).copysign(*x);
+                mesh.vertices.push(s.center + s.m1 * (s.a * x + flare) + s.m2 * (s.b * y));
             }
         }
         // m1 × m2 is the direction of travel, so sections run counter-clockwise seen from the end.
@@ -166,8 +186,15 @@ impl FlexureSolid {
         mesh
     }
 
-    /// Sections from root to root, refined by a cubic through the given stations.
+    /// Sections from root to root.
     fn stations(&self) -> Vec<Station> {
+        let (free, [head, tail]) = self.pieces();
+        head.into_iter().rev().chain(free).chain(tail).collect()
+    }
+
+    /// Sections between the roots, refined by a cubic through the given stations, and those of both roots, each from the flexure
+    /// into its stub.
+    fn pieces(&self) -> (Vec<Station>, [Vec<Station>; 2]) {
         let count = [self.m1.len(), self.m2.len(), self.a_mm.len(), self.b_mm.len()]
             .iter()
             .fold(self.centreline.len(), |n, k| n.min(*k));
@@ -181,11 +208,11 @@ impl FlexureSolid {
                 };
                 // A left-handed frame is turned, or the solid would be inside out.
                 let m1 = if tangent.dot(&chord) < 0.0 { -self.m1[i] } else { self.m1[i] };
-                Station { center: self.centreline[i], m1, m2: self.m2[i], a: self.a_mm[i], b: self.b_mm[i] }
+                Station { center: self.centreline[i], m1, m2: self.m2[i], a: self.a_mm[i], b: self.b_mm[i], flare: 0.0 }
             })
             .collect();
         let mut out: Vec<Station> = Vec::new();
-        let (Some(first), Some(last)) = (given.first(), given.last()) else { return out };
+        let (Some(first), Some(last)) = (given.first(), given.last()) else { return Default::default() };
         let sharp = |s: &Station, outward: Vector3<f64>, (depth, fa, fb): (f64, f64, f64)| Station {
             center: s.center + outward * depth,
             a: s.a * fa,
@@ -217,8 +244,7 @@ impl FlexureSolid {
                 }
             }
         });
-        let [head, tail] = roots;
-        head.into_iter().rev().chain(out).chain(tail).collect()
+        (out, roots)
     }
 }
 
@@ -278,7 +304,11 @@ fn rounded(fillet: &Fillet, end: &Station, outward: Vector3<f64>, free: &[Statio
     let (mut way, mut widest) = (0.0, *end);
     for [along, grown] in fillet.stations() {
         let s = at(along);
-        widest = Station { a: s.a + grown, b: s.b + grown * fillet.all_round, ..s };
+        widest = if fillet.all_round > 0.0 {
+            Station { a: s.a + grown, b: s.b + grown * fillet.all_round, ..s }
+        } else {
+            Station { flare: grown, ..s }
+        };
         way = along;
         out.push(widest);
     }
@@ -287,6 +317,7 @@ fn rounded(fillet: &Fillet, end: &Station, outward: Vector3<f64>, free: &[Statio
         center: if way >= 0.0 { widest.center + outward * *depth } else { at(way + depth).center },
         a: widest.a * fa,
         b: widest.b * fb,
+        flare: widest.flare * fa,
         ..*end
     };
     out.extend(ROOT.iter().map(into));
@@ -299,7 +330,7 @@ fn straight(p: &Station, q: &Station, u: f64) -> Station {
     let m1 = p.m1 * (1.0 - u) + q.m1 * u;
     let m1 = (m1 - m2 * m1.dot(&m2)).try_normalize(1e-12).unwrap_or(p.m1);
     let (a, b) = (p.a + (q.a - p.a) * u, p.b + (q.b - p.b) * u);
-    Station { center: p.center.lerp(&q.center, u), m1, m2, a, b }
+    Station { center: p.center.lerp(&q.center, u), m1, m2, a, b, flare: 0.0 }
 }
 
 /// Unit tangents at the stations.
@@ -318,5 +349,5 @@ fn between(p: &Station, q: &Station, tp: &Vector3<f64>, tq: &Vector3<f64>, u: f6
     let m2 = (p.m2 * (1.0 - u) + q.m2 * u).try_normalize(1e-12).unwrap_or(p.m2);
     let m1 = p.m1 * (1.0 - u) + q.m1 * u;
     let m1 = (m1 - m2 * m1.dot(&m2)).try_normalize(1e-12).unwrap_or(p.m1);
-    Station { center, m1, m2, a: p.a + (q.a - p.a) * u, b: p.b + (q.b - p.b) * u }
+    Station { center, m1, m2, a: p.a + (q.a - p.a) * u, b: p.b + (q.b - p.b) * u, flare: 0.0 }
 }
