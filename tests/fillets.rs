@@ -175,6 +175,11 @@ fn a_fillet_begins_where_the_root_is_as_compliant_as_a_clamp() {
 fn what_is_solved_is_as_without() {
     let (none, some) = (pivot("", ""), pivot("links fillet 0.5 mm", ""));
     assert_eq!(design_digest(&design(&none)), design_digest(&design(&some)));
+    // Also where the radius is a constant that occurs elsewhere.
+    for radius in ["10 mm", "0.8 mm / 2", "0.3 mm + 0.5 mm"] {
+        let same = pivot(&format!("links fillet {radius}"), "fillet 0.4 mm");
+        assert_eq!(design_digest(&design(&none)), design_digest(&design(&same)));
+    }
     assert_ne!(input(&none), input(&some));
     assert_eq!(input(&none), input(&some).unfilleted());
     // None, in two ways.

@@ -56,8 +56,7 @@ impl<'a> Evaluator<'a> {
         let mut rods = Vec::new();
         if let Some(layers) = &layers {
             let process = process.as_ref().map(|(item, _)| *item);
-            let fillet_mm = self.fillet(scope, sheet.fillet.map(|(e, _)| e)).unwrap_or(0.0);
-            self.flexures(scope, module, &mut s, process, (layers.height_mm, fillet_mm), &mut rods);
+            self.flexures(scope, module, &mut s, process, layers.height_mm, &mut rods);
         }
         let model = self.rod_model(&sheet);
         let cycle = match sheet.cycle {
@@ -95,6 +94,8 @@ impl<'a> Evaluator<'a> {
             exports.extend(self.export(scope, e, &driven, &sheet.drives));
         }
         self.as_is = false;
+        // Last: the numbers of nodes in the graph, and so locks, do not depend on it.
+        self.fillets(scope, &sheet, &s, &mut rods);
         if self.out.iter().any(Diagnostic::is_error) {
             return None;
         }
@@ -160,7 +161,7 @@ impl<'a> Evaluator<'a> {
         module: usize,
         s: &mut Structure<'a>,
         process: Option<ItemRef>,
-        (layer_height_mm, links_fillet_mm): (f64, f64),
+        layer_height_mm: f64,
         rods: &mut Vec<Rod>,
     ) {
         for i in 0..s.joints.len() {
@@ -168,12 +169,7 @@ impl<'a> Evaluator<'a> {
             else {
                 continue;
             };
-            let Some(template) = &text.template else {
-                self.no_fillet(text);
-                continue;
-            };
-            let own = text.fillet.as_ref().map(|e| self.fillet(scope, Some(e)));
-            let fillet_mm = own.map_or(links_fillet_mm, |own| own.unwrap_or(0.0));
+            let Some(template) = &text.template else { continue };
             let Some(joint) = s.joints.get(i) else { continue };
             let bodies = joint.bodies.clone();
             let site = Site {
@@ -185,7 +181,6 @@ impl<'a> Evaluator<'a> {
                 kind: &text.kind.node,
                 shorter_link_mm,
                 layer_height_mm,
-                fillet_mm,
                 process,
             };
             if let Ok(made) = self.template(scope, module, template, &site, (rods, &mut s.bodies))

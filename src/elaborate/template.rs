@@ -28,8 +28,6 @@ pub struct Site<'s> {
     pub kind: &'s str,
     pub shorter_link_mm: f64,
     pub layer_height_mm: f64,
-    /// Radius of the fillets, mm.
-    pub fillet_mm: f64,
     /// None: wrong or missing, which has been reported.
     pub process: Option<ItemRef>,
 }
@@ -338,7 +336,7 @@ impl<'a> Evaluator<'a> {
             second_axis: second_axis?,
             section: section?,
             section_to: section_to?,
-            fillet_mm: site.fillet_mm,
+            fillet_mm: 0.0,
             origin: at,
         })
     }
