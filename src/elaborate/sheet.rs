@@ -158,10 +158,9 @@ impl<'a> Evaluator<'a> {
                 }
             }
             StatementKind::Links { height, fillet } => {
-                for (word, value, known) in [
-                    ("links height", height, &mut sheet.height),
-                    ("links fillet", fillet, &mut sheet.fillet),
-                ] {
+                for (word, value, known) in
+                    [("links height", height, &mut sheet.height), ("links fillet", fillet, &mut sheet.fillet)]
+                {
                     if let Some(value) = value
                         && self.once(word, at, known.map(|m| m.1))
                     {

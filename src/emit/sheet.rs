@@ -195,7 +195,8 @@ fn lies(out: &mut String, part: &Laid) {
     let lines = part.process.machine.line_mm;
     let fillets = has_fillets(part);
     let (mut heading, mut rule) = (String::new(), String::new());
-    for (_, title) in [(lines.is_some(), " wall lines |"), (fillets, " fillet, mm |")].iter().filter(|c| c.0) {
+    for (_, title) in [(lines.is_some(), " wall lines |"), (fillets, " fillet, mm |")].iter().filter(|c| c.0)
+    {
         heading += title;
         rule += " --- |";
     }

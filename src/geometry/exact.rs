@@ -101,6 +101,15 @@ pub fn triangles_meet(s_ids: &[usize; 3], s: &[Point; 3], t_ids: &[usize; 3], t:
     let own =
         |ids: &[usize; 3], others: &[usize; 3]| (0..3).find(|k| !others.contains(&ids[*k])).unwrap_or(0);
     let common = |ids: &[usize; 3], others: &[usize; 3]| (0..3).find(|k| others.contains(&ids[*k]));
+    // Nearly all pairs are told apart here: what they do not share of one lies on one side of the other's plane.
+    let beside = |ids: &[usize; 3], x: &[Point; 3], others: &[usize; 3], y: &[Point; 3]| {
+        let mut sides =
+            (0..3).filter(|k| !others.contains(&ids[*k])).map(|k| side(&y[0], &y[1], &y[2], &x[k]));
+        sides.next().is_some_and(|first| first != Ordering::Equal && sides.all(|s| s == first))
+    };
+    if beside(s_ids, s, t_ids, t) || beside(t_ids, t, s_ids, s) {
+        return false;
+    }
     match s_ids.iter().filter(|i| t_ids.contains(i)).count() {
         0 => {
             (0..3).any(|k| segment_meets(&s[k], &s[(k + 1) % 3], t))

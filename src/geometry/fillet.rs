@@ -4,7 +4,7 @@
 //! the root behind is too compliant to be a clamp (`rod::extra_length_mm`): so the printed flexure bends as
 //! the rod does that is clamped in the plane, and the nose stands where the arc ends.
 
-use super::link::{stub_radius};
+use super::link::stub_radius;
 use super::parts::{FlexureSolid, PartsInput};
 use crate::rod::{SectionShape, concentration, extra_length_mm};
 use nalgebra::Vector3;

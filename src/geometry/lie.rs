@@ -2,7 +2,7 @@
 //! that bending pulls along printed lines and not layers apart, and its width stands upright, so that its thickness is
 //! drawn and not stacked. What lies otherwise is named.
 
-use super::check::check_mesh;
+use super::check::{MeshFacts, check_mesh};
 use super::mesh::Mesh;
 use super::parts::FlexureSolid;
 use super::sweep::tangents;
@@ -55,23 +55,25 @@ pub enum Posture {
 }
 
 impl Lying {
-    /// The part on the bed, with coordinates exact in `f32`. A part that is only moved or turned by right angles keeps its
-    /// shape to the last bit. Where another is, its coordinates round otherwise, and slender triangles may then cross: of
+    /// The part on the bed, with coordinates exact in `f32`, and what it is like there. A part that is only moved or turned by right angles
+    /// keeps its shape to the last bit. Where another is, its coordinates round otherwise, and slender triangles may then cross: of
     /// the first few places beside each other, all nearer than a printer resolves, the first where the part is sound is
     /// taken (the first of all where none is, or the part is not sound where it was made).
-    pub fn mesh(&self, mesh: &Mesh) -> Mesh {
+    pub fn mesh(&self, mesh: &Mesh) -> (Mesh, MeshFacts) {
         let placed = |k: usize| {
             let shift = Vector3::new(1.0, 1.0, 0.25) * (k as f64 * ASIDE_MM);
             let place = |p: &Vector3<f64>| self.rotation * p + self.translation + shift;
             let vertices = mesh.vertices.iter().map(place).collect();
-            Mesh { vertices, triangles: mesh.triangles.clone() }.rounded_to_f32().sorted()
+            let lying = Mesh { vertices, triangles: mesh.triangles.clone() }.rounded_to_f32().sorted();
+            let facts = check_mesh(&lying);
+            (lying, facts)
         };
         let first = placed(0);
         let exact = self.rotation.iter().all(|x| *x == 0.0 || x.abs() == 1.0);
-        if exact || check_mesh(&first).is_sound() {
+        if exact || first.1.is_sound() {
             return first;
         }
-        (1..PLACES).map(placed).find(|m| check_mesh(m).is_sound()).unwrap_or(first)
+        (1..PLACES).map(placed).find(|(_, facts)| facts.is_sound()).unwrap_or(first)
     }
 
     /// The flexures that leave the layers, with their angles (rad).
@@ -241,9 +243,9 @@ mod tests {
         let lying = lie(&mesh, &leaves.iter().collect::<Vec<_>>(), None).unwrap();
         assert_eq!(lying.rotation, Matrix3::identity());
         assert_eq!(lying.flexures, [Posture::Standing]);
-        let (low, high) = lying.mesh(&mesh).bounding_box().unwrap();
+        let (low, high) = lying.mesh(&mesh).0.bounding_box().unwrap();
         assert!(low.norm() < 1e-5 && (high - lying.size_mm).norm() < 1e-5, "{low} {high}");
-        assert!((lying.mesh(&mesh).volume_mm3() - mesh.volume_mm3()).abs() < 1e-3 * mesh.volume_mm3());
+        assert!((lying.mesh(&mesh).0.volume_mm3() - mesh.volume_mm3()).abs() < 1e-3 * mesh.volume_mm3());
     }
 
     #[test]

@@ -13,7 +13,7 @@ use super::gap::{Fusion, fusions};
 use super::link::{BodyPlan, plan_body};
 use super::mesh::Mesh;
 use super::slot::Facets;
-use super::tidy::{SHORT_EDGE_MM, without_short_edges};
+use super::tidy::finished;
 use super::union::{BooleanError, subtract_all, union_all};
 use crate::math::Pose;
 use crate::rod::SectionShape;
@@ -338,14 +338,15 @@ pub(super) fn build_part(
     let links = links.collect::<Result<_, BooleanError>>().map_err(failed)?;
     solids.extend(input.flexures.iter().filter(inside).map(|f| f.mesh(input.facets.around)));
     let united = union_all(&solids).map_err(failed)?;
-    let mesh = without_short_edges(&united, SHORT_EDGE_MM).rounded_to_f32().sorted();
+    let mesh = finished(&united);
     let notes = bodies.iter().flat_map(|i| plans[*i].notes.iter().cloned()).collect();
     Ok(Part { name, bodies: bodies.to_vec(), mesh, links, notes })
 }
 
 /// A link with the fillets of its flexures, as it is seen without them.
 fn with_fillets(input: &PartsInput, body: usize, link: &Mesh) -> Result<Mesh, BooleanError> {
-    let ends = |f: &FlexureSolid| [(false, f.bodies.0), (true, f.bodies.1)].map(|(at_end, b)| (at_end, b == body));
+    let ends =
+        |f: &FlexureSolid| [(false, f.bodies.0), (true, f.bodies.1)].map(|(at_end, b)| (at_end, b == body));
     let roots = input.flexures.iter().flat_map(|f| {
         let own = ends(f).into_iter().filter(|e| e.1);
         own.filter_map(|(at_end, _)| f.root_mesh(at_end, input.facets.around)).collect::<Vec<_>>()

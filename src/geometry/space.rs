@@ -5,8 +5,8 @@ use super::anchor::{Anchor, FlexureEnd, Follow, SizeBy};
 use super::distance::{nearer_than, separation};
 use super::link::{
     BAR_BELOW_MM, BOSS_BELOW_MM, BOSS_EXTRA_MM, Builder, CLEAR_MM, LEAST_HALF_MM, Node, ROUND_MM, Role,
-    SAME_NODE_MM, SPREAD_MM, STUB_BELOW_MM, STUB_FREE_MM, STUB_RADIUS_MM, STUB_ROUND_MM,
-    plan_body, spread, stub_radius,
+    SAME_NODE_MM, SPREAD_MM, STUB_BELOW_MM, STUB_FREE_MM, STUB_RADIUS_MM, STUB_ROUND_MM, plan_body, spread,
+    stub_radius,
 };
 use super::parts::{BodySolid, Eye, FlexureSolid, GeometryError};
 use super::skeleton::connect;

@@ -208,7 +208,14 @@ impl FlexureSolid {
                 };
                 // A left-handed frame is turned, or the solid would be inside out.
                 let m1 = if tangent.dot(&chord) < 0.0 { -self.m1[i] } else { self.m1[i] };
-                Station { center: self.centreline[i], m1, m2: self.m2[i], a: self.a_mm[i], b: self.b_mm[i], flare: 0.0 }
+                Station {
+                    center: self.centreline[i],
+                    m1,
+                    m2: self.m2[i],
+                    a: self.a_mm[i],
+                    b: self.b_mm[i],
+                    flare: 0.0,
+                }
             })
             .collect();
         let mut out: Vec<Station> = Vec::new();

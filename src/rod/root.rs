@@ -115,7 +115,9 @@ mod tests {
     #[test]
     fn nothing_is_made_up() {
         assert_eq!(extra_length_mm(0.8, 0.0, 0.0, SectionShape::Ellipse), 0.0);
-        for (t, r, d) in [(0.8, 0.0, 4.4), (0.8, 0.08, 4.4), (0.8, 20.0, 4.4), (4.4, 0.5, 4.4), (5.0, 0.5, 4.4)] {
+        for (t, r, d) in
+            [(0.8, 0.0, 4.4), (0.8, 0.08, 4.4), (0.8, 20.0, 4.4), (4.4, 0.5, 4.4), (5.0, 0.5, 4.4)]
+        {
             assert_eq!(concentration(t, r, d, false), None, "{t} {r} {d}");
         }
         // Both ranges give the same where they meet, to the rounding of their coefficients.

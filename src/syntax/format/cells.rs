@@ -35,7 +35,9 @@ pub(super) fn column(node: &Node, at: usize, source: &str) -> Option<Column> {
         (Kind::Joint, Kind::Bodies) => new(1, "joint"),
         (Kind::Joint, Kind::Keyword) => new(2, "joint"),
         (Kind::Joint, Kind::Template) => wide(TEMPLATE, "as"),
-        (Kind::Joint, Kind::Axis | Kind::Layer | Kind::Pin | Kind::Fillet | Kind::Into) => clause(node, at, "joint"),
+        (Kind::Joint, Kind::Axis | Kind::Layer | Kind::Pin | Kind::Fillet | Kind::Into) => {
+            clause(node, at, "joint")
+        }
         (Kind::Template, Kind::Overrides) => {
             let name = node.first(Kind::Ident).and_then(|i| source.get(i.range()));
             new(OVERRIDES, name.unwrap_or(""))
