@@ -237,6 +237,7 @@ fn wire(
         m2.push(t.cross(&side));
     }
     FlexureSolid {
+        fillets: [None; 2],
         path: path.into(),
         joint: 0,
         joint_point: (ends[0] + ends[1]) / 2.0,
@@ -261,6 +262,7 @@ fn wires_between_bodies_of_nothing_else() {
         (1, 2, v(6.0, 21.0, 20.0), v(2.0, 38.0, 12.0), v(-5.0, 20.0, -3.0)),
     ];
     let flexures = wires.iter().enumerate().map(|(i, (a, b, p, q, along))| FlexureSolid {
+        fillets: [None; 2],
         joint: i,
         ..wire(&format!("wire{i}"), (*a, *b), [*p, *q], *along, 1.4)
     });

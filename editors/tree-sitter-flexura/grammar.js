@@ -70,13 +70,18 @@ module.exports = grammar({
       seq(
         field("kind", $._kind), field("name", $.identifier), ":", field("body", $.identifier),
         "to", commas(field("body", $.identifier)), "at", field("at", $._value),
-        repeat(choice($.axis, $.layer, $.pin, $.into, $.template)),
+        repeat(choice($.axis, $.layer, $.pin, $.fillet, $.into, $.template)),
       ),
     axis: ($) => seq("axis", $._value, optional(seq("and", $._value))),
     pin: ($) => seq("pin", $._value),
+    fillet: ($) => seq("fillet", $._value),
     into: ($) => seq("into", $.identifier, "toward", $._value),
     template: ($) => seq("as", field("name", $.identifier), optional(alias($._fields, $.overrides))),
-    links: ($) => seq("links", "height", $._value),
+    links: ($) =>
+      seq(
+        "links",
+        choice(seq("height", $._value, optional($.fillet)), seq($.fillet, optional(seq("height", $._value)))),
+      ),
     model: ($) => seq("model", $.identifier),
     hole: ($) => seq("hole", $._value, "on", $._body_ref, "at", $._value, optional(seq("along", $._value))),
     _body_ref: ($) => seq($.identifier, optional($.index), optional(seq(".", $.identifier))),

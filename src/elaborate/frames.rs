@@ -6,7 +6,8 @@ use super::eval::{Evaluator, Outcome};
 use super::sheet::Sheet;
 use super::structure::{SAME_POINT_MM, Structure};
 use crate::diagnostic::Diagnostic;
-use crate::ir::{ExprPoint, Joint, JointKind, Layers};
+use crate::ir::{ExprPoint, Joint, JointKind, Layers, Rod};
+use crate::syntax::ast::Expr;
 
 /// Height of a link where the text is silent, mm.
 const DEFAULT_HEIGHT_MM: f64 = 12.0;
@@ -151,6 +152,36 @@ impl<'a> Evaluator<'a> {
             );
         }
         Ok(Layers { height_mm, pitch_mm: height_mm + clearance_mm.unwrap_or(0.0), axis })
+    }
+
+    /// Gives the rods of all joints their fillets.
+    pub(super) fn fillets(&mut self, scope: usize, sheet: &Sheet<'a>, s: &Structure<'a>, rods: &mut [Rod]) {
+        let of_links = sheet.fillet.map_or(0.0, |(e, _)| self.fillet(scope, e));
+        for (i, text) in s.texts.iter().enumerate() {
+            let own = text.fillet.as_ref().map(|e| {
+                if text.template.is_none() {
+                    self.out.push(
+                        Diagnostic::error(codes::MISPLACED, "only a compliant joint has fillets", e.at)
+                            .help("leave out `fillet`, or make the joint of a flexure with `as …`"),
+                    );
+                }
+                self.fillet(scope, e)
+            });
+            let radius = own.unwrap_or(of_links);
+            rods.iter_mut().filter(|r| r.joint == i).for_each(|r| r.fillet_mm = radius);
+        }
+    }
+
+    /// A radius, mm; it grows with `scale`, as thickness does. 0 where it is wrong, which is told.
+    fn fillet(&mut self, scope: usize, e: &'a Expr) -> f64 {
+        let radius = self.eval_fixed(scope, e, Dimension::LENGTH, "the radius of a fillet").unwrap_or(0.0);
+        if radius < 0.0 {
+            self.out.push(
+                Diagnostic::error(codes::SIZE, "the radius of a fillet must not be negative", e.at)
+                    .help("`fillet 0 mm` is none"),
+            );
+        }
+        radius.max(0.0)
     }
 
     /// Least distance, over the bodies of a joint, from the joint's point to the body's nearest other

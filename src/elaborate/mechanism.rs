@@ -95,6 +95,8 @@ impl<'a> Evaluator<'a> {
             exports.extend(self.export(scope, e, &driven, &sheet.drives));
         }
         self.as_is = false;
+        // Last: the numbers of nodes in the graph, and so locks, do not depend on it.
+        self.fillets(scope, &sheet, &s, &mut rods);
         if self.out.iter().any(Diagnostic::is_error) {
             return None;
         }

@@ -49,6 +49,8 @@ pub struct Sheet<'a> {
     pub material: Option<(&'a Ident, Origin)>,
     pub process: Option<(&'a Ident, Origin)>,
     pub height: Option<(&'a Expr, Origin)>,
+    /// Radius of fillets.
+    pub fillet: Option<(&'a Expr, Origin)>,
     pub model: Option<(&'a Ident, Origin)>,
     pub cycle: Option<(&'a Expr, Option<&'a Expr>, Origin)>,
     pub drives: Vec<DriveText<'a>>,
@@ -156,10 +158,15 @@ impl<'a> Evaluator<'a> {
                     sheet.process = Some((name, at));
                 }
             }
-            StatementKind::Links { height } => {
-                let first = sheet.height.map(|m| m.1);
-                if self.once("links height", at, first) {
-                    sheet.height = Some((height, at));
+            StatementKind::Links { height, fillet } => {
+                for (word, value, known) in
+                    [("links height", height, &mut sheet.height), ("links fillet", fillet, &mut sheet.fillet)]
+                {
+                    if let Some(value) = value
+                        && self.once(word, at, known.map(|m| m.1))
+                    {
+                        *known = Some((value, at));
+                    }
                 }
             }
             StatementKind::Model(name) => {

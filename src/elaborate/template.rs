@@ -336,6 +336,7 @@ impl<'a> Evaluator<'a> {
             second_axis: second_axis?,
             section: section?,
             section_to: section_to?,
+            fillet_mm: 0.0,
             origin: at,
         })
     }

@@ -59,6 +59,17 @@ pub struct Leaf {
     pub thickness_mm: [f64; 2],
     /// Least and largest width, mm.
     pub width_mm: [f64; 2],
+    /// Its fillets, the one with the larger stress.
+    pub fillet: Option<Notch>,
+}
+
+/// A fillet where a flexure enters its link.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Notch {
+    /// Radius, mm.
+    pub radius_mm: f64,
+    /// Largest stress in bending by that of the flexure beside it; none outside of what is known.
+    pub concentration: Option<f64>,
 }
 
 impl Laid {

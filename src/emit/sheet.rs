@@ -1,6 +1,6 @@
 //! The print sheet: what goes onto the machine, how it lies there, and why. As Markdown, and in words for the report.
 
-use super::plate::{Laid, Leaf, Plate};
+use super::plate::{Laid, Leaf, Notch, Plate};
 use crate::geometry::Posture;
 use std::fmt::Write;
 
@@ -108,15 +108,17 @@ pub struct Told {
     pub fits: Option<bool>,
     /// How it lies, and why so.
     pub lies: String,
-    /// Its flexures: path, thickness, width, what they do in the layers.
-    pub flexures: Vec<[String; 4]>,
+    /// Its flexures: path, thickness, width, what they do in the layers, radius of the fillets with the stress there.
+    pub flexures: Vec<[String; 5]>,
+    /// What to say of fillets, where it has any.
+    pub fillets: Option<&'static str>,
 }
 
 /// A part in words.
 pub fn told(part: &Laid) -> Told {
     let size = part.lying.size_mm;
     let row = |(leaf, posture): (&Leaf, Posture)| {
-        [leaf.path.clone(), range(leaf.thickness_mm), range(leaf.width_mm), stands(posture)]
+        [leaf.path.clone(), range(leaf.thickness_mm), range(leaf.width_mm), stands(posture), notch(leaf)]
     };
     Told {
         name: part.name.clone(),
@@ -126,8 +128,27 @@ pub fn told(part: &Laid) -> Told {
         fits: part.fits(),
         lies: orientation(part),
         flexures: part.postures().map(row).collect(),
+        fillets: has_fillets(part).then_some(KT),
     }
 }
+
+fn has_fillets(part: &Laid) -> bool {
+    part.flexures.iter().any(|f| f.fillet.is_some())
+}
+
+/// Radius of the fillets, and by what the largest stress there exceeds the flexure's own.
+fn notch(leaf: &Leaf) -> String {
+    match leaf.fillet {
+        None => "none".into(),
+        Some(Notch { radius_mm, concentration: Some(k) }) => format!("{radius_mm:.2}, Kt {k:.2}"),
+        Some(Notch { radius_mm, concentration: None }) => format!("{radius_mm:.2}, Kt not known"),
+    }
+}
+
+/// What Kt is, beside a table that shows it.
+const KT: &str = "Kt is the stress concentration of the fillet in bending (a handbook's, for the step from the flexure to its \
+                  stub): the largest stress at the root is that of the flexure, as it is reported, times Kt. Reported stresses are \
+                  without it.";
 
 /// What a flexure does in the layers.
 fn stands(posture: Posture) -> String {
@@ -172,22 +193,33 @@ fn lies(out: &mut String, part: &Laid) {
         return;
     }
     let lines = part.process.machine.line_mm;
-    let heading = if lines.is_some() { " wall lines |" } else { "" };
-    let rule = if lines.is_some() { " --- |" } else { "" };
+    let fillets = has_fillets(part);
+    let (mut heading, mut rule) = (String::new(), String::new());
+    for (_, title) in [(lines.is_some(), " wall lines |"), (fillets, " fillet, mm |")].iter().filter(|c| c.0)
+    {
+        heading += title;
+        rule += " --- |";
+    }
     let _ = writeln!(
         out,
         "\n| flexure | thickness, mm | width, mm | in the layers |{heading}\n| --- | --- | --- | --- |{rule}"
     );
     for (leaf, posture) in part.postures() {
-        let walls = lines.map_or(String::new(), |line| format!(" {} |", wall_lines(leaf, posture, line)));
+        let mut more = lines.map_or(String::new(), |line| format!(" {} |", wall_lines(leaf, posture, line)));
+        if fillets {
+            more += &format!(" {} |", notch(leaf));
+        }
         let _ = writeln!(
             out,
-            "| {} | {} | {} | {} |{walls}",
+            "| {} | {} | {} | {} |{more}",
             leaf.path,
             range(leaf.thickness_mm),
             range(leaf.width_mm),
             stands(posture)
         );
+    }
+    if fillets {
+        let _ = writeln!(out, "\n{KT}");
     }
 }
 

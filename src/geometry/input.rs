@@ -139,7 +139,7 @@ pub fn flexure_solid(
             [m1, t.cross(&m1)]
         })
         .collect();
-    FlexureSolid {
+    let mut solid = FlexureSolid {
         path: rod.path.clone(),
         joint: rod.joint,
         joint_point: layout.rod_ends[index][0].origin,
@@ -150,7 +150,10 @@ pub fn flexure_solid(
         m1: frames.iter().map(|f| f[0]).collect(),
         m2: frames.iter().map(|f| f[1]).collect(),
         centreline,
-    }
+        fillets: [None; 2],
+    };
+    solid.fillet(rod.fillet_mm, design.process.least_wall_mm);
+    solid
 }
 
 /// A body's place among the bodies of a conventional joint: by their own layers, upwards.

@@ -218,6 +218,7 @@ mod tests {
         let m1 = wide.cross(&t);
         let n = 5;
         FlexureSolid {
+            fillets: [None; 2],
             path: "leaf".into(),
             joint: 0,
             joint_point: from,

@@ -7,6 +7,7 @@
 
 use super::anchor::{Anchor, FlexureEnd, Follow, SizeBy};
 use super::distance::nearer_than;
+use super::fillet::Fillet;
 use super::fitted::{FitFault, Pocket};
 use super::mesh::Mesh;
 use super::parts::{Bore, Eye, FLOOR_MM, FlexureSolid, GeometryError, PartsInput};
@@ -148,6 +149,19 @@ impl BodyPlan {
             Slot { disc_radius_mm: radius, ..b.slot() }.mesh(facets, spread(i + 100) + 0.5)
         });
         bores.chain(self.pockets.iter().map(Pocket::mesh)).collect()
+    }
+}
+
+/// Half width of the stub of a flexure with half thickness `a_mm`.
+pub(super) fn stub_radius(a_mm: f64, wall_mm: f64) -> f64 {
+    STUB_RADIUS_MM.max(a_mm + wall_mm)
+}
+
+impl FlexureSolid {
+    /// Where the centre of its stub's round nose stands beyond the attachment plane, mm.
+    pub(super) fn nose_center_mm(&self, at_end: bool, radius_mm: f64) -> f64 {
+        let fillet = &self.fillets[usize::from(at_end)];
+        fillet.as_ref().map_or(radius_mm - STUB_OVER_MM, Fillet::nose_center_mm)
     }
 }
 
@@ -403,7 +417,7 @@ impl Builder<'_> {
         };
         let (a, b) = flexure.end_axes(at_end);
         let wall = self.input.least_wall_mm;
-        let radius = STUB_RADIUS_MM.max(a + wall);
+        let radius = stub_radius(a, wall);
         // Room along the axis: the layer's faces, and the rims of other flexures of this joint.
         let middle = p.dot(&axis);
         let level = flexure.joint_point.dot(&axis);
@@ -429,7 +443,8 @@ impl Builder<'_> {
         let half_height =
             (high - low) / 2.0 - STUB_BELOW_MM - 0.5 * SPREAD_MM * spread(2 * index + usize::from(at_end));
         let center = self.at_level(&p, (low + high) / 2.0);
-        let nose = center + flat * (radius - STUB_OVER_MM);
+        let nose_mm = flexure.nose_center_mm(at_end, radius);
+        let nose = center + flat * nose_mm;
         let root = center + flat * (STUB_FREE_MM + self.boss_radius());
         // The height of each face by the flexure, then of middle and half of the stub.
         let [lower, upper] = follows.map(|f| if f { 1.0 } else { 0.0 });
@@ -443,7 +458,7 @@ impl Builder<'_> {
         let along =
             |along_mm: f64, along: SizeBy, level: SizeBy| Anchor::Stub { end, along_mm, along, level };
         let reach = STUB_FREE_MM + self.boss_radius();
-        let nose_anchor = along(radius - STUB_OVER_MM, radius_by, centred);
+        let nose_anchor = along(nose_mm, radius_by, centred);
         self.push_following(
             Role::Stub(index),
             Slot::bar(nose, root, axis, radius, half_height.max(LEAST_HALF_MM), STUB_ROUND_MM),

@@ -10,6 +10,7 @@
 //! | `space`, `guide`, `riser` | a body whose joints point different ways; sliders; ways into other layers |
 //! | `carve`, `field`, `wall` | links that make way for their own flexures, and what is left of them |
 //! | `slot`, `sweep` | meshes of the primitives and of flexures |
+//! | `fillet` | fillets where flexures enter their stubs |
 //! | `tidy` | removal of tiny edges before rounding to `f32` |
 //! | `union` | the boolean kernel's only client |
 //! | `mesh`, `check`, `exact`, `ray` | triangle meshes, their facts by exact arithmetic, measurements on them |
@@ -28,6 +29,7 @@ pub mod distance;
 pub mod exact;
 mod field;
 mod filled;
+pub mod fillet;
 pub mod fitted;
 pub mod gap;
 mod guide;
@@ -63,6 +65,7 @@ pub use capsules::{SkeletonCapsule, follows_geometry, skeleton_capsules};
 pub use carve::{Carving, Cut, carve};
 pub use check::{MeshFacts, check_mesh};
 pub use cycle::{CycleGaps, LeastGap, MovedState, carved_cycle_gaps, cycle_gaps};
+pub use fillet::Fillet;
 pub use fitted::{FitFault, FitFaultKind, MountSolid, Pocket, SeatSolid};
 pub use gap::{Fusion, Member};
 pub use input::{flexure_solid, parts_input};

@@ -7,6 +7,7 @@
 
 use super::carve::{Carving, carve};
 use super::cycle::MovedState;
+use super::fillet::Fillet;
 use super::fitted::{FitFault, FitFaultKind, MountSolid, PlateSolid, SeatSolid, out_of_reach};
 use super::gap::{Fusion, fusions};
 use super::link::{BodyPlan, plan_body};
@@ -169,6 +170,8 @@ pub struct FlexureSolid {
     pub a_mm: Vec<f64>,
     /// Semi-axis along m₂ at each station.
     pub b_mm: Vec<f64>,
+    /// Fillets at its start and at its end.
+    pub fillets: [Option<Fillet>; 2],
 }
 
 /// A part to print.
@@ -338,12 +341,29 @@ pub(super) fn build_part(
         .collect::<Result<_, BooleanError>>()
         .map_err(failed)?;
     let inside = |f: &&FlexureSolid| bodies.contains(&f.bodies.0);
-    let links = solids.clone();
+    let links = bodies.par_iter().zip(&solids).map(|(b, link)| with_fillets(input, *b, link));
+    let links = links.collect::<Result<_, BooleanError>>().map_err(failed)?;
     solids.extend(input.flexures.iter().filter(inside).map(|f| f.mesh(input.facets.around)));
     let united = union_all(&solids).map_err(failed)?;
     let mesh = finished(&united);
     let notes = bodies.iter().flat_map(|i| plans[*i].notes.iter().cloned()).collect();
     Ok(Part { name, bodies: bodies.to_vec(), mesh, links, notes })
+}
+
+/// A link with the fillets of its flexures, as it is seen without them.
+fn with_fillets(input: &PartsInput, body: usize, link: &Mesh) -> Result<Mesh, BooleanError> {
+    let ends =
+        |f: &FlexureSolid| [(false, f.bodies.0), (true, f.bodies.1)].map(|(at_end, b)| (at_end, b == body));
+    let roots = input.flexures.iter().flat_map(|f| {
+        let own = ends(f).into_iter().filter(|e| e.1);
+        own.filter_map(|(at_end, _)| f.root_mesh(at_end, input.facets.around)).collect::<Vec<_>>()
+    });
+    let mut pieces: Vec<Mesh> = roots.collect();
+    if pieces.is_empty() {
+        return Ok(link.clone());
+    }
+    pieces.insert(0, link.clone());
+    union_all(&pieces)
 }
 
 fn validate(input: &PartsInput) -> Result<(), GeometryError> {

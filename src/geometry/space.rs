@@ -5,8 +5,8 @@ use super::anchor::{Anchor, FlexureEnd, Follow, SizeBy};
 use super::distance::{nearer_than, separation};
 use super::link::{
     BAR_BELOW_MM, BOSS_BELOW_MM, BOSS_EXTRA_MM, Builder, CLEAR_MM, LEAST_HALF_MM, Node, ROUND_MM, Role,
-    SAME_NODE_MM, SPREAD_MM, STUB_BELOW_MM, STUB_FREE_MM, STUB_OVER_MM, STUB_RADIUS_MM, STUB_ROUND_MM,
-    plan_body, spread,
+    SAME_NODE_MM, SPREAD_MM, STUB_BELOW_MM, STUB_FREE_MM, STUB_RADIUS_MM, STUB_ROUND_MM, plan_body, spread,
+    stub_radius,
 };
 use super::parts::{BodySolid, Eye, FlexureSolid, GeometryError};
 use super::skeleton::connect;
@@ -139,16 +139,17 @@ impl Builder<'_> {
         let (p, outward) = (flexure.end_point(at_end), flexure.outward(at_end));
         let (a, b) = flexure.end_axes(at_end);
         let wall = self.input.least_wall_mm;
-        let radius = STUB_RADIUS_MM.max(a + wall);
+        let radius = stub_radius(a, wall);
         let reach = self.stub_free() + self.ball_radius();
-        let (nose, root) = (p + outward * (radius - STUB_OVER_MM), p + outward * reach);
+        let nose_mm = flexure.nose_center_mm(at_end, radius);
+        let (nose, root) = (p + outward * nose_mm, p + outward * reach);
         // No axis: the end is taken as it points.
         let end = FlexureEnd { flexure: index, at_end, axis: Vector3::zeros() };
         let by_a = SizeBy { a: f64::from(u8::from(a + wall > STUB_RADIUS_MM)), ..SizeBy::default() };
         let along =
             |along_mm: f64, along: SizeBy| Anchor::Stub { end, along_mm, along, level: SizeBy::default() };
         let mut follow = Follow {
-            ends: [along(radius - STUB_OVER_MM, by_a), along(reach, SizeBy::default())],
+            ends: [along(nose_mm, by_a), along(reach, SizeBy::default())],
             sized_by: Some(end),
             radius: by_a,
             half_height: by_a,

@@ -32,7 +32,7 @@ pub fn weigh(design: &Design, values: &[f64]) -> Option<Vec<PrintedExtra>> {
     let motion = solve_motion(design, values).ok()?;
     let layout = Layout::new(design, &motion, values);
     let model = Model::new(design, &layout, values, EDGES, false).ok()?;
-    let plans = plan_bodies(&parts_input(design, &layout, &model)).ok()?;
+    let plans = plan_bodies(&parts_input(design, &layout, &model).unfilleted()).ok()?;
     let at = design.exprs.evaluate(values);
     let extra = |(b, plan): (usize, &BodyPlan)| {
         let points: Vec<Vector3<f64>> =

@@ -302,8 +302,15 @@ pub struct Rod {
     /// Of a tapered rod the cross-section at its end, of the same shape: half widths run linearly in arc length.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub section_to: Option<Section>,
+    /// Radius of the fillets at its ends, mm; 0: none. The rod is the same with and without.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub fillet_mm: f64,
     /// Declaration in the template.
     pub origin: Origin,
+}
+
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
 }
 
 fn is_false(b: &bool) -> bool {

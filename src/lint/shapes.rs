@@ -26,6 +26,8 @@ pub struct Flexure {
     pub along_mm: [f64; 2],
     /// How far its ends stand from the joint, across the axis, mm.
     pub reach_mm: [f64; 2],
+    /// Radius of its fillets, mm; 0: none.
+    pub fillet_mm: f64,
     /// A round wire.
     pub round: bool,
     /// Largest turn of its one end against the other, from the rest pose; none with a body of the template's own, rad.
@@ -88,6 +90,7 @@ pub fn flexures(of: &OfDesign, motion: &Motion, lengths_mm: &[f64]) -> Vec<Flexu
                 wide_mm: over(1, f64::min),
                 along_mm: [ends[0].z.min(ends[1].z) - half, ends[0].z.max(ends[1].z) + half],
                 reach_mm: ends.map(|e| Vector3::new(e.x, e.y, 0.0).norm()),
+                fillet_mm: rod.fillet_mm,
                 round: matches!(rod.section, crate::ir::Section::Round { .. }),
                 turn_rad: (!own).then(|| motion.states.iter().map(turn).fold(0.0, f64::max)),
                 shift_mm: if slides && !own { motion.span(rod.joint).from_rest_rad } else { 0.0 },

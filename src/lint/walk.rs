@@ -30,11 +30,11 @@ pub fn expressions<'a>(s: &'a Statement, f: &mut dyn FnMut(&'a Expr)) {
     match &s.kind {
         K::Param { value, .. } | K::Let { value, .. } | K::Point { value, .. } => f(value),
         K::Rest { value, .. } | K::Output { value, .. } | K::Target { value, .. } => f(value),
-        K::Links { height } => f(height),
+        K::Links { height, fillet } => height.iter().chain(fillet).for_each(f),
         K::Body { layer, .. } => layer.iter().for_each(f),
         K::Joint(j) => {
             f(&j.point);
-            [&j.axis, &j.second_axis, &j.layer, &j.pin].into_iter().flatten().for_each(&mut *f);
+            [&j.axis, &j.second_axis, &j.layer, &j.pin, &j.fillet].into_iter().flatten().for_each(&mut *f);
             j.into.iter().for_each(|(_, q)| f(q));
             j.template.iter().flat_map(|t| &t.overrides).for_each(|(_, v)| f(v));
         }

@@ -257,7 +257,7 @@ impl<'d> Problem<'d> {
         if !self.needs_links {
             return Some(Vec::new());
         }
-        let plans = plan_bodies(&parts_input(self.design, &model.layout, model)).ok()?;
+        let plans = plan_bodies(&parts_input(self.design, &model.layout, model).unfilleted()).ok()?;
         Some(skeleton_capsules(self.design, &plans, model))
     }
 

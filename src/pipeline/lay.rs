@@ -5,8 +5,8 @@ use super::joined::Printed;
 use super::scene::Moving;
 use crate::diagnostic::Diagnostic;
 use crate::emit::outlines::layer_name;
-use crate::emit::plate::{Laid, Leaf, Plate};
-use crate::geometry::{Band, FlexureSolid, Mesh, MeshFacts, Posture, lie};
+use crate::emit::plate::{Laid, Leaf, Notch, Plate};
+use crate::geometry::{Band, Fillet, FlexureSolid, Mesh, MeshFacts, Posture, lie};
 use crate::ir::{Assembly, Origin};
 use rayon::prelude::*;
 
@@ -50,7 +50,18 @@ fn leaf(flexure: &FlexureSolid) -> Leaf {
         let ends = v.iter().fold([f64::INFINITY, 0.0_f64], |[l, h], x| [l.min(*x), h.max(*x)]);
         ends.map(|x| 2.0 * x)
     };
-    Leaf { path: flexure.path.clone(), thickness_mm: range(&flexure.a_mm), width_mm: range(&flexure.b_mm) }
+    let notch = |f: &Fillet| Notch { radius_mm: f.radius_mm, concentration: f.concentration() };
+    let fillets = flexure.fillets.iter().flatten().map(notch);
+    Leaf {
+        path: flexure.path.clone(),
+        thickness_mm: range(&flexure.a_mm),
+        width_mm: range(&flexure.b_mm),
+        // One that is not known counts as the worst.
+        fillet: fillets.max_by(|a, b| {
+            let of = |n: &Notch| n.concentration.unwrap_or(f64::INFINITY);
+            of(a).total_cmp(&of(b))
+        }),
+    }
 }
 
 /// Parts that no cutter makes of plates: there are heights between which their section changes.

@@ -60,6 +60,7 @@ mod derivative_tests;
 mod expected;
 mod options;
 mod rest;
+mod root;
 mod section;
 mod sensitivity;
 #[cfg(test)]
@@ -80,6 +81,7 @@ pub use condense::FactorReport;
 pub use expected::RodForces;
 pub use options::{Corrections, RestFrames, RodOptions};
 pub use rest::{MIN_EDGES, PARAMETERS, RodError, RodParameters};
+pub use root::{concentration, extra_length_mm};
 pub use section::{RodMaterial, SectionShape, Stiffness, ellipse_stiffness, rectangle_stiffness};
 pub use sensitivity::{ParameterMatrix, SensitivityError};
 pub use shape::{LARGEST_CURVATURE, LEAST_SLENDERNESS, LEAST_SPEED};

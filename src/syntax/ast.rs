@@ -159,16 +159,18 @@ pub enum StatementKind {
         /// `layer N`.
         layer: Option<Expr>,
     },
-    /// `KIND NAME: A to B[, C] at P [axis D [and E]] [layer N] [pin D] [into BODY toward Q]… [as TEMPLATE [{ … }]]`
+    /// `KIND NAME: A to B[, C] at P [axis D [and E]] [layer N] [pin D] [fillet R] [into BODY toward Q]… [as TEMPLATE [{ … }]]`
     Joint(Box<Joint>),
     /// `material NAME`
     Material(Ident),
     /// `print on NAME`
     PrintOn(Ident),
-    /// `links height EXPR`: height of every planar link along the stacking axis.
+    /// `links [height EXPR] [fillet EXPR]`: what all links have in common.
     Links {
-        /// Height.
-        height: Expr,
+        /// Height of every planar link along the stacking axis.
+        height: Option<Expr>,
+        /// Radius where flexures enter them.
+        fillet: Option<Expr>,
     },
     /// `model NAME`: theory of the flexures.
     Model(Ident),
@@ -404,6 +406,8 @@ pub struct Joint {
     pub layer: Option<Expr>,
     /// `pin D`.
     pub pin: Option<Expr>,
+    /// `fillet R`.
+    pub fillet: Option<Expr>,
     /// `into BODY toward Q`, each.
     pub into: Vec<(Ident, Expr)>,
     /// `as TEMPLATE { overrides }`.

@@ -52,7 +52,10 @@ impl Lower<'_> {
             Kind::Joint => StatementKind::Joint(Box::new(self.joint(node)?)),
             Kind::MaterialUse => StatementKind::Material(self.ident(node)?),
             Kind::Print => StatementKind::PrintOn(self.ident(node)?),
-            Kind::Links => StatementKind::Links { height: self.value(node)? },
+            Kind::Links => StatementKind::Links {
+                height: self.value(node),
+                fillet: node.first(Kind::Fillet).and_then(|n| self.value(n)),
+            },
             Kind::Model => StatementKind::Model(self.ident(node)?),
             Kind::Cycle => {
                 let mut values = self.values(node).into_iter();
@@ -172,13 +175,15 @@ impl Lower<'_> {
             second_axis: None,
             layer: None,
             pin: None,
+            fillet: None,
             into: Vec::new(),
             template: None,
         };
         let mut seen: Vec<(Kind, Origin)> = Vec::new();
         for clause in node.parts() {
             let kind = clause.kind;
-            if !matches!(kind, Kind::Axis | Kind::Layer | Kind::Pin | Kind::Into | Kind::Template) {
+            use Kind::{Axis, Fillet, Into, Layer, Pin, Template};
+            if !matches!(kind, Axis | Layer | Pin | Fillet | Into | Template) {
                 continue;
             }
             let first = seen.iter().find(|(k, _)| *k == kind && kind != Kind::Into).map(|(_, at)| *at);
@@ -193,6 +198,7 @@ impl Lower<'_> {
                     (joint.axis, joint.second_axis) = (axes.next(), axes.next());
                 }
                 Kind::Layer => joint.layer = self.value(clause),
+                Kind::Fillet => joint.fillet = self.value(clause),
                 Kind::Pin => joint.pin = self.value(clause),
                 Kind::Into => joint.into.extend(self.ident(clause).zip(self.value(clause))),
                 _ => joint.template = self.template(clause),

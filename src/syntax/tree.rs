@@ -55,6 +55,7 @@ pub enum Kind {
     Bodies,
     Axis,
     Pin,
+    Fillet,
     Into,
     Template,
     Overrides,

@@ -111,7 +111,7 @@ pub(super) fn form(word: &str) -> Option<&'static str> {
         word if is_joint_kind(word) => "KIND NAME: BODY to BODY at POINT",
         "material" => "material NAME",
         "print" => "print on PROCESS",
-        "links" => "links height LENGTH",
+        "links" => "links height LENGTH` or `links fillet RADIUS",
         "model" => "model corrected` or `model plain",
         "cycle" => "cycle NUMBER steps over TIME",
         "drive" => "drive JOINT from VALUE to VALUE with MOTOR",

@@ -81,6 +81,7 @@ fn leaf(
     }
     let wide = (HEIGHT - CLEARANCE) / 2.0;
     FlexureSolid {
+        fillets: [None; 2],
         path: path.into(),
         joint,
         joint_point,

@@ -5,7 +5,7 @@
   "edition" "use" "mechanism" "flexure" "replaces" "material" "process" "motor" "param" "let" "point" "ground" "link"
   "links" "model" "height" "print" "on" "cycle" "steps" "over" "drive" "from" "to" "by" "with" "continuous" "drum"
   "rest" "at" "trace" "minimize" "weight" "require" "export" "rod" "along" "section" "keys" "linear" "smooth" "and"
-  "output" "target" "about" "direction" "axis" "layer" "pin" "into" "toward" "as" "free" "body" "first" "second"
+  "output" "target" "about" "direction" "axis" "layer" "pin" "fillet" "into" "toward" "as" "free" "body" "first" "second"
   "place" "turned" "scale" "merging" "mirror" "across" "sharing" "load" "gravity" "hole" "moment" "workspace" "allow"
   "string" "via" "assert" "variant" "for" "case" "mount" "horn" "plate" "solid" "thick" "clearance" "deep" "margin"
   "fatigue" "spring" "stop" "sweep" "tolerance"

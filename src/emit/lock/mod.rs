@@ -162,6 +162,12 @@ pub fn design_digest(design: &Design) -> String {
                 }
             }
         }
+        // Where fillets begin follows the rod, not the other way round.
+        for rod in fields.get_mut("rods").and_then(Value::as_array_mut).into_iter().flatten() {
+            if let Value::Object(rod) = rod {
+                rod.remove("fillet_mm");
+            }
+        }
         fields.remove("requirements");
         for case in fields.get_mut("cases").and_then(Value::as_array_mut).into_iter().flatten() {
             if let Value::Object(case) = case {

@@ -67,6 +67,8 @@ rules! {
     w1209_bends_across_layers
     w1210_buckles
     w1211_reaches_past_joint
+    w1212_large_fillet
+    w1213_small_fillet
     w1301_stress_near_strength
     w1302_torque_near_stall
     w1303_strain_repeated

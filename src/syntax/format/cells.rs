@@ -35,7 +35,9 @@ pub(super) fn column(node: &Node, at: usize, source: &str) -> Option<Column> {
         (Kind::Joint, Kind::Bodies) => new(1, "joint"),
         (Kind::Joint, Kind::Keyword) => new(2, "joint"),
         (Kind::Joint, Kind::Template) => wide(TEMPLATE, "as"),
-        (Kind::Joint, Kind::Axis | Kind::Layer | Kind::Pin | Kind::Into) => clause(node, at, "joint"),
+        (Kind::Joint, Kind::Axis | Kind::Layer | Kind::Pin | Kind::Fillet | Kind::Into) => {
+            clause(node, at, "joint")
+        }
         (Kind::Template, Kind::Overrides) => {
             let name = node.first(Kind::Ident).and_then(|i| source.get(i.range()));
             new(OVERRIDES, name.unwrap_or(""))
@@ -89,8 +91,8 @@ pub(super) fn column(node: &Node, at: usize, source: &str) -> Option<Column> {
 /// A clause: the first ones stand below each other whatever they are, further ones below their like.
 fn clause(node: &Node, at: usize, table: &str) -> Option<Column> {
     let is_clause = |k: Kind| {
-        use Kind::{Axis, Into, Layer, Merging, Pin, Scaled, Template, Turned};
-        matches!(k, Axis | Into | Layer | Merging | Pin | Scaled | Template | Turned)
+        use Kind::{Axis, Fillet, Into, Layer, Merging, Pin, Scaled, Template, Turned};
+        matches!(k, Axis | Fillet | Into | Layer | Merging | Pin | Scaled | Template | Turned)
     };
     let before: Vec<Kind> = node.children.iter().take(at).map(|c| c.kind).filter(|k| is_clause(*k)).collect();
     let rank = u8::try_from(before.len()).ok()?.checked_add(FIRST_CLAUSE)?;
