@@ -62,10 +62,10 @@ fn design(text: &str) -> Design {
     found.design.unwrap()
 }
 
-fn codes(text: &str) -> Vec<&'static str> {
+fn codes(text: &str) -> Vec<String> {
     let files = BTreeMap::from([("main.mech".to_string(), text.to_string())]);
     let found = elaborate("main.mech", &files, &Options::default());
-    found.diagnostics.iter().filter(|d| d.is_error()).map(|d| d.code).collect()
+    found.diagnostics.iter().filter(|d| d.is_error()).map(|d| d.code.clone()).collect()
 }
 
 fn input(text: &str) -> PartsInput {
