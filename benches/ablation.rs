@@ -6,15 +6,15 @@
 //! name only: the six mechanisms by the paper's forms with its weights.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
-use flexura::elaborate::{FileError, Files, Options, elaborate};
+use flexura::elaborate::{FileError, Files, Options, SolidFile, elaborate};
 use flexura::equilibrium::{Layout, Model, SensitivityWorkspace, sweep};
 use flexura::ir::Design;
 use flexura::kinematics::solve_motion;
 use flexura::optimize::{Method, Problem, optimize};
 use flexura::pipeline::{Compiler, DriveMeasures, EDGES, Measures, Stages, measure};
 use std::path::PathBuf;
-use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 /// The paper's terms with its weights (SI), one more a row.
@@ -86,6 +86,11 @@ impl Files for Variant {
             return Ok(self.text.clone());
         }
         std::fs::read_to_string(self.folder.join(path)).map_err(|_| FileError::NotFound)
+    }
+
+    fn solid(&self, path: &str) -> Result<Arc<SolidFile>, FileError> {
+        let bytes = std::fs::read(self.folder.join(path)).map_err(|_| FileError::NotFound)?;
+        Ok(Arc::new(SolidFile::new(bytes)))
     }
 }
 

@@ -32,7 +32,8 @@ fn blocks(page: &str, fence: &str) -> Vec<String> {
 }
 
 fn errors(text: &str) -> Vec<String> {
-    let files = BTreeMap::from([("page.mech".to_string(), text.to_string())]);
+    let block = include_str!("elaborate/errors/solids/block.stl");
+    let files = BTreeMap::from([("page.mech", text), ("body.stl", block)].map(|(n, t)| (n.into(), t.into())));
     let out = elaborate("page.mech", &files, &Options::default());
     out.diagnostics.iter().map(|d| format!("{} {}", d.code, d.message)).collect()
 }

@@ -1,12 +1,13 @@
 //! The six mechanisms of the examples, from disk.
 
-use flexura::elaborate::{FileError, Files, Options, elaborate};
+use flexura::elaborate::{FileError, Files, Options, SolidFile, elaborate};
 use flexura::emit::lock::Lock;
 use flexura::equilibrium::Layout;
 use flexura::ir::{Assembly, Design};
 use flexura::kinematics::solve_motion;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 pub const NAMES: [&str; 6] = ["chebyshev", "jansen", "car", "dragon", "eye", "hand"];
 /// Those and Chebyshev's linkage with every term of the paper: what is optimised.
@@ -18,6 +19,11 @@ struct Folder(PathBuf);
 impl Files for Folder {
     fn read(&self, path: &str) -> Result<String, FileError> {
         std::fs::read_to_string(self.0.join(path)).map_err(|_| FileError::NotFound)
+    }
+
+    fn solid(&self, path: &str) -> Result<Arc<SolidFile>, FileError> {
+        let bytes = std::fs::read(self.0.join(path)).map_err(|_| FileError::NotFound)?;
+        Ok(Arc::new(SolidFile::new(bytes)))
     }
 }
 

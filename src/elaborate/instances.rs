@@ -170,13 +170,17 @@ impl<'a> Evaluator<'a> {
                     continue;
                 }
                 StatementKind::Horn(_) | StatementKind::Plate(_) => {
-                    let message = "this belongs into the mechanism that is placed";
-                    let label = match &s.kind {
-                        StatementKind::Horn(_) => "a horn sits on a hinge, and hinges stand in mechanisms",
-                        _ => "a plate lies in a layer, and layers are those of mechanisms",
+                    let (what, label) = match &s.kind {
+                        StatementKind::Horn(_) => {
+                            ("horn", "a horn sits on a hinge, and hinges stand in mechanisms")
+                        }
+                        _ => ("plate", "a plate lies in a layer, and layers are those of mechanisms"),
                     };
-                    let help = "write it there: every copy then has its own";
-                    self.out.push(Diagnostic::error(codes::FITTING, message, s.at).label(label).help(help));
+                    let message = format!("`{what}` beside instances is not available yet");
+                    let help = "write it in the mechanism that is placed: every copy then has its own";
+                    self.out.push(
+                        Diagnostic::error(codes::LATER_STATEMENT, message, s.at).label(label).help(help),
+                    );
                     continue;
                 }
                 StatementKind::Joint(j) => j.kind.node.as_str(),

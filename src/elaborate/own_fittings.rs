@@ -9,7 +9,7 @@ use super::structure::{SAME_POINT_MM, Structure};
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::ir::expr::{ExprGraph, Node};
 use crate::ir::{ExprPoint, JointKind, Mount};
-use crate::syntax::ast::Ident;
+use crate::syntax::ast::{Expr, ExprKind, Ident};
 use nalgebra::Vector3;
 
 impl<'a> Evaluator<'a> {
@@ -39,14 +39,19 @@ impl<'a> Evaluator<'a> {
                 s.body_index.insert(name.node.clone(), joined);
             }
         }
-        let known = |name: &Ident| s.body_index.contains_key(&name.node);
-        for (text, at) in sheet.holes.iter().filter(|t| known(&t.0.body)) {
+        let mut known = |name: &Ident, point: Option<&Expr>| {
+            s.body_index.contains_key(&name.node) && self.is_own_point(point, parts)
+        };
+        let holes: Vec<_> = sheet.holes.iter().filter(|t| known(&t.0.body, Some(&t.0.point))).collect();
+        let mounts: Vec<_> = sheet.mounts.iter().filter(|t| known(&t.0.body, Some(&t.0.point))).collect();
+        let solids: Vec<_> = sheet.solids.iter().filter(|t| known(&t.0.body, t.0.point.as_ref())).collect();
+        for (text, at) in holes {
             let Ok((joined, mut hole)) = self.hole(scope, text, *at, &s) else { continue };
             let Ok(place) = self.standing_place(hole.position, *at, &mut places) else { continue };
             hole.position = place;
             parts.joined.get_mut(joined).into_iter().for_each(|j| j.holes.push(hole.clone()));
         }
-        for (text, at) in sheet.mounts.iter().filter(|t| known(&t.0.body)) {
+        for (text, at) in mounts {
             let Ok((joined, mut mount)) = self.mount(scope, outside.module, text, *at, &s) else { continue };
             let Ok(place) = self.standing_place(mount.position, *at, &mut places) else { continue };
             let toward = mount.toward.map(|q| self.standing_place(q, *at, &mut places)).transpose();
@@ -57,7 +62,7 @@ impl<'a> Evaluator<'a> {
             (mount.position, mount.toward) = (place, toward);
             parts.joined.get_mut(joined).into_iter().for_each(|j| j.fittings.mounts.push(mount.clone()));
         }
-        for (text, at) in sheet.solids.iter().filter(|t| known(&t.0.body)) {
+        for (text, at) in solids {
             let Ok((joined, mut solid)) = self.solid(scope, text, *at, &s, outside) else { continue };
             let Ok(place) = self.standing_place(solid.position, *at, &mut places) else { continue };
             solid.position = place;
@@ -72,6 +77,21 @@ impl<'a> Evaluator<'a> {
             *slot = places.push(Node::Const(self.fixed(id, at, "a place beside instances")?));
         }
         Ok(out)
+    }
+
+    /// Points of instances move with what is optimised in them, and are not known here.
+    fn is_own_point(&mut self, point: Option<&Expr>, parts: &Parts) -> bool {
+        let Some(Expr { kind: ExprKind::Name(path), at }) = point else { return true };
+        let of_instance = |first: &Ident| parts.instance(&first.node).is_some();
+        if path.len() < 2 || !path.first().is_some_and(of_instance) {
+            return true;
+        }
+        self.out.push(
+            Diagnostic::error(codes::LATER_STATEMENT, "a point of an instance is not available here yet", *at).help(
+                "write its place in the assembly; what belongs to a joint stands in the mechanism that is placed",
+            ),
+        );
+        false
     }
 
     /// The joined body that a name means: a ground of the assembly's own, or `INSTANCE.GROUND`.
