@@ -131,9 +131,19 @@ impl BodyPlan {
     pub fn meshes(&self, facets: &Facets) -> Vec<Mesh> {
         let mesh = |(i, (role, slot)): (usize, &(Role, Slot))| match role {
             Role::Plate(_) => self.prism(i).map_or_else(Mesh::default, |p| p.mesh(facets)),
+            Role::Bar => slot.mesh_with_hidden_ends(facets, spread(i), self.hidden_ends(slot)),
             _ => slot.mesh(facets, spread(i)),
         };
         self.slots.iter().enumerate().map(mesh).collect()
+    }
+
+    /// Which of a bar's ends lie wholly inside of what it leads to.
+    fn hidden_ends(&self, bar: &Slot) -> [bool; 2] {
+        let holds = |end: &Vector3<f64>| {
+            let others = self.slots.iter().filter(|(role, _)| !matches!(role, Role::Bar | Role::Plate(_)));
+            others.map(|(_, s)| s).any(|s| s.holds_end(bar, end))
+        };
+        [&bar.start, &bar.end].map(holds)
     }
 
     /// One closed mesh a bore, and one a pocket. The facets of a bore touch the stated circle from outside, so that a pin of

@@ -12,6 +12,7 @@
 //! | `slot`, `sweep` | meshes of the primitives and of flexures |
 //! | `tidy` | removal of tiny edges before rounding to `f32` |
 //! | `union` | the boolean kernel's only client |
+//! | `touch`, `graft` | what touches, and so has to be united; flexures put onto their links |
 //! | `mesh`, `check`, `exact`, `ray` | triangle meshes, their facts by exact arithmetic, measurements on them |
 //! | `weigh` | what links weigh, before anything is meshed |
 //! | `joined` | parts of several instances |
@@ -28,6 +29,7 @@ pub mod exact;
 mod field;
 pub mod fitted;
 pub mod gap;
+mod graft;
 mod guide;
 mod hole;
 pub mod input;
@@ -48,6 +50,7 @@ pub mod slot;
 mod space;
 pub mod sweep;
 pub mod tidy;
+mod touch;
 pub mod union;
 mod wall;
 pub mod weigh;
@@ -67,7 +70,7 @@ pub use lie::{Lying, Posture, lie};
 pub use mesh::Mesh;
 pub use parts::{
     BodySolid, Bore, Eye, FlexureSolid, GeometryError, Guide, Part, Parts, PartsInput, build_carved_parts,
-    build_parts, build_wanted_parts, plan_bodies,
+    build_parts, build_planned, plan_bodies,
 };
 pub use ray::Probe;
 pub use section::{Band, bands, section};
