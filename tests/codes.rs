@@ -22,7 +22,8 @@ const PLACELESS: &[&str] = &[
     "E0763", "E0764", "E0770", "W0727",
 ];
 /// The compiler's own faults, told instead of a panic: no text is known that leads there.
-const OWN_FAULTS: &[&str] = &["E0630", "E0631", "E0643", "E0646", "E0647", "E0648", "E0720", "E0750"];
+const OWN_FAULTS: &[&str] =
+    &["E0630", "E0631", "E0643", "E0646", "E0647", "E0648", "W0659", "E0720", "E0750"];
 /// Held to their places where they arise: in `kinematics.rs`, `pipeline/judged_tests.rs`, `manners.rs` and `coupon/tests.rs`.
 const ELSEWHERE: &[&str] = &["E0501", "W0604", "W0605", "W0606", "W0751", "E0771", "E0772", "W0770"];
 /// Annotated designs whose findings later stages make.

@@ -1,6 +1,6 @@
 //! Parts as they lie on the machine's bed: plain data for the STL and 3MF files and the print sheet.
 
-use crate::geometry::{Lying, Mesh, Posture};
+use crate::geometry::{Lying, Mesh, MeshFacts, Posture};
 use crate::ir::{Material, Process};
 use nalgebra::Vector3;
 
@@ -38,6 +38,8 @@ pub struct Laid {
     pub name: String,
     /// As it lies, the box around it from the origin on, mm.
     pub mesh: Mesh,
+    /// What that mesh is like.
+    pub facts: MeshFacts,
     /// How it lies.
     pub lying: Lying,
     /// What it is made of.

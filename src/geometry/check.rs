@@ -8,7 +8,7 @@
 use super::exact::{Point, is_flat, on_lattice, triangles_meet};
 use super::mesh::Mesh;
 use nalgebra::Vector3;
-use std::collections::BTreeMap;
+use rayon::prelude::*;
 
 /// What a mesh is like.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,6 +56,17 @@ impl MeshFacts {
     }
 }
 
+/// One triangle's use of an edge.
+struct Edge {
+    /// Vertices at its ends, the lesser one first.
+    ends: (usize, usize),
+    triangle: usize,
+    /// It runs from the lesser to the larger one.
+    upwards: bool,
+    /// Corners of the triangle at these ends, 3 t + k.
+    corners: [usize; 2],
+}
+
 /// A mesh with its vertices on the lattice, those on one point merged.
 struct OnLattice {
     points: Vec<Point>,
@@ -64,19 +75,17 @@ struct OnLattice {
 
 impl OnLattice {
     fn new(mesh: &Mesh) -> Self {
-        let mut ids: BTreeMap<Point, usize> = BTreeMap::new();
-        let mut points = Vec::new();
-        let place: Vec<usize> = mesh
-            .vertices
-            .iter()
-            .map(|p| {
-                let q = on_lattice(p);
-                *ids.entry(q).or_insert_with(|| {
-                    points.push(q);
-                    points.len() - 1
-                })
-            })
-            .collect();
+        let on: Vec<Point> = mesh.vertices.iter().map(on_lattice).collect();
+        let mut order: Vec<usize> = (0..on.len()).collect();
+        order.par_sort_unstable_by_key(|i| (on[*i], *i));
+        let mut points: Vec<Point> = Vec::with_capacity(on.len());
+        let mut place = vec![0; on.len()];
+        for i in order {
+            if points.last() != Some(&on[i]) {
+                points.push(on[i]);
+            }
+            place[i] = points.len() - 1;
+        }
         // A vertex that does not exist stays one that does not.
         let there = |i: usize| place.get(i).copied().unwrap_or(usize::MAX);
         let triangles = mesh.triangles.iter().map(|t| t.map(there)).collect();
@@ -92,19 +101,43 @@ impl OnLattice {
         let [a, b, c] = self.triangles[t];
         a == b || b == c || c == a || is_flat(&self.corners(t))
     }
+
+    /// Broad phase: boxes in a median-split tree.
+    fn crossing_pairs(&self) -> Vec<(usize, usize)> {
+        let corners: Vec<[Point; 3]> =
+            (0..self.triangles.len()).into_par_iter().map(|t| self.corners(t)).collect();
+        // Whole numbers below 2^53: exact in floats.
+        let around = |t: &[Point; 3]| {
+            let [a, b, c] = t.map(|p| Vector3::from(p.map(|x| x as f64)));
+            (a.inf(&b).inf(&c), a.sup(&b).sup(&c))
+        };
+        let boxes: Vec<(Vector3<f64>, Vector3<f64>)> = corners.par_iter().map(around).collect();
+        let solid: Vec<usize> = (0..corners.len()).into_par_iter().filter(|t| !self.is_flat(*t)).collect();
+        let tree = Tree::build(&mut solid.clone(), &boxes);
+        let meets = |near: &mut Vec<usize>, &t: &usize| {
+            near.clear();
+            tree.query(&boxes[t], near, &boxes);
+            let crosses = |u: &usize| {
+                triangles_meet(&self.triangles[t], &corners[t], &self.triangles[*u], &corners[*u])
+            };
+            near.iter().filter(|u| **u > t && crosses(u)).map(|u| (t, *u)).collect::<Vec<_>>()
+        };
+        let mut found: Vec<(usize, usize)> =
+            solid.par_iter().map_init(Vec::new, meets).flatten_iter().collect();
+        found.par_sort_unstable();
+        found
+    }
 }
 
 /// Checks a mesh.
 pub fn check_mesh(mesh: &Mesh) -> MeshFacts {
     let on = OnLattice::new(mesh);
-    // Edge → triangles that run through it upwards, downwards (by vertex index).
-    let mut edges: BTreeMap<(usize, usize), (usize, usize)> = BTreeMap::new();
     let mut piece = Pieces::new(on.triangles.len());
     // Corners 3 t + k: neighbours over an edge are joined at both its ends.
     let mut fans = Pieces::new(3 * on.triangles.len());
-    let mut first_at: BTreeMap<(usize, usize), (usize, [usize; 2])> = BTreeMap::new();
     let mut used = vec![false; on.points.len()];
     let mut sound = !on.triangles.is_empty() && mesh.vertices.iter().all(|p| p.iter().all(|x| x.is_finite()));
+    let mut edges: Vec<Edge> = Vec::with_capacity(3 * on.triangles.len());
     for (t, ids) in on.triangles.iter().enumerate() {
         for k in 0..3 {
             let (i, j) = (ids[k], ids[(k + 1) % 3]);
@@ -112,24 +145,25 @@ pub fn check_mesh(mesh: &Mesh) -> MeshFacts {
             if let Some(u) = used.get_mut(i) {
                 *u = true;
             }
-            let key = (i.min(j), i.max(j));
-            let mut ends = [3 * t + k, 3 * t + (k + 1) % 3];
-            let count = edges.entry(key).or_default();
-            if i < j {
-                count.0 += 1;
-            } else {
-                count.1 += 1;
-                ends.swap(0, 1);
-            }
-            let (first, at) = *first_at.entry(key).or_insert((t, ends));
-            piece.join(first, t);
-            fans.join(at[0], ends[0]);
-            fans.join(at[1], ends[1]);
+            let (here, there) = (3 * t + k, 3 * t + (k + 1) % 3);
+            let upwards = i < j;
+            let corners = if upwards { [here, there] } else { [there, here] };
+            edges.push(Edge { ends: (i.min(j), i.max(j)), triangle: t, upwards, corners });
         }
     }
-    let closed = sound && edges.values().all(|(up, down)| up + down == 2);
-    let oriented = sound && edges.values().all(|(up, down)| *up <= 1 && *down <= 1);
-    let crossing = crossing_pairs(mesh);
+    edges.par_sort_unstable_by_key(|e| (e.ends, e.triangle, e.corners));
+    let (mut closed, mut oriented) = (sound, sound);
+    for uses in edges.chunk_by(|a, b| a.ends == b.ends) {
+        let up = uses.iter().filter(|e| e.upwards).count();
+        closed &= uses.len() == 2;
+        oriented &= up <= 1 && uses.len() - up <= 1;
+        for pair in uses.windows(2) {
+            piece.join(pair[0].triangle, pair[1].triangle);
+            fans.join(pair[0].corners[0], pair[1].corners[0]);
+            fans.join(pair[0].corners[1], pair[1].corners[1]);
+        }
+    }
+    let crossing = on.crossing_pairs();
     let (least, largest) = mesh.bounding_box().unwrap_or_default();
     MeshFacts {
         closed,
@@ -174,35 +208,12 @@ impl Pieces {
 }
 
 /// Pairs of triangles that have more in common than their corners and edges, sorted; those without an area apart.
-/// Broad phase: boxes in a sweep over a median-split tree.
 pub fn crossing_pairs(mesh: &Mesh) -> Vec<(usize, usize)> {
-    let on = OnLattice::new(mesh);
-    let corners: Vec<[Point; 3]> = (0..on.triangles.len()).map(|t| on.corners(t)).collect();
-    // Whole numbers below 2^53: exact in floats.
-    let boxes: Vec<(Vector3<f64>, Vector3<f64>)> = corners
-        .iter()
-        .map(|t| {
-            let [a, b, c] = t.map(|p| Vector3::from(p.map(|x| x as f64)));
-            (a.inf(&b).inf(&c), a.sup(&b).sup(&c))
-        })
-        .collect();
-    let mut ids: Vec<usize> = (0..corners.len()).filter(|t| !on.is_flat(*t)).collect();
-    let solid = ids.clone();
-    let tree = Tree::build(&mut ids, &boxes);
-    let mut found = Vec::new();
-    let mut near = Vec::new();
-    for t in solid {
-        near.clear();
-        tree.query(&boxes[t], &mut near, &boxes);
-        for &u in near.iter().filter(|u| **u > t) {
-            if triangles_meet(&on.triangles[t], &corners[t], &on.triangles[u], &corners[u]) {
-                found.push((t, u));
-            }
-        }
-    }
-    found.sort_unstable();
-    found
+    OnLattice::new(mesh).crossing_pairs()
 }
+
+/// Halves of a tree with fewer triangles are not worth a second thread.
+const SHARED: usize = 4096;
 
 /// Bounding-box tree over triangles.
 pub(crate) struct Tree {
@@ -227,9 +238,16 @@ impl Tree {
         }
         let side = (largest - least).imax();
         let middle = |i: usize| boxes[i].0[side] + boxes[i].1[side];
-        ids.sort_by(|i, j| middle(*i).total_cmp(&middle(*j)).then(i.cmp(j)));
-        let (left, right) = ids.split_at_mut(ids.len() / 2);
-        let halves = Box::new([Self::build(left, boxes), Self::build(right, boxes)]);
+        let half = ids.len() / 2;
+        ids.select_nth_unstable_by(half, |i, j| middle(*i).total_cmp(&middle(*j)).then(i.cmp(j)));
+        let (left, right) = ids.split_at_mut(half);
+        let halves = if half < SHARED {
+            [Self::build(left, boxes), Self::build(right, boxes)]
+        } else {
+            let (left, right) = rayon::join(|| Self::build(left, boxes), || Self::build(right, boxes));
+            [left, right]
+        };
+        let halves = Box::new(halves);
         Self { least, largest, content: Content::Halves(halves) }
     }
 

@@ -186,3 +186,83 @@ fn grafted(whole: &mut Mesh, cuts: &[Cut]) -> bool {
     whole.drop_unused_vertices();
     true
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::union::union_all;
+    use crate::geometry::{Facets, FlexureSolid, Slot, check_mesh};
+    use crate::rod::SectionShape;
+
+    const VOLUME: f64 = 1e-6;
+
+    fn block(x: f64) -> Mesh {
+        let at = Vector3::new(x, 0.3, 0.0);
+        Slot::bar(at, at + Vector3::y() * 4.0, Vector3::z(), 3.0, 4.0, 0.8).mesh(&Facets::default(), 0.0)
+    }
+
+    /// A leaf of 20 mm from x = 0 on, bent a little.
+    fn leaf(y: f64) -> Mesh {
+        let n = 21;
+        let x = |k: i32| f64::from(k) * 20.0 / f64::from(n - 1);
+        let at = |k: i32| Vector3::new(x(k), y + 0.02 * x(k) * (20.0 - x(k)), 0.0);
+        let tangent = |k: i32| (at(k + 1) - at(k - 1)).normalize();
+        let leaf = FlexureSolid {
+            path: "leaf".into(),
+            joint: 0,
+            joint_point: Vector3::zeros(),
+            bodies: (0, 1),
+            section: SectionShape::Ellipse,
+            centreline: (0..n).map(at).collect(),
+            m1: (0..n).map(|k| Vector3::z().cross(&tangent(k))).collect(),
+            m2: vec![Vector3::z(); n as usize],
+            a_mm: vec![0.4; n as usize],
+            b_mm: vec![2.5; n as usize],
+        };
+        leaf.mesh(64)
+    }
+
+    fn same(links: &[Mesh], leaves: &[Mesh]) {
+        let all: Vec<Mesh> = links.iter().chain(leaves).cloned().collect();
+        let (ours, kernels) = (united(links, leaves).unwrap(), union_all(&all).unwrap());
+        let facts = check_mesh(&ours.rounded_to_f32());
+        assert!(facts.is_printable(), "{facts:?}");
+        assert!((ours.volume_mm3() / kernels.volume_mm3() - 1.0).abs() < VOLUME);
+    }
+
+    #[test]
+    fn leaves_between_two_blocks_are_cut_off_and_put_back() {
+        let links = [block(-2.0), block(22.0)];
+        let leaves = [leaf(0.5), leaf(3.0)];
+        let solids: Vec<Solid<'_>> = links.iter().chain(&leaves).map(Solid::new).collect();
+        let others = [&solids[0], &solids[1], &solids[3]];
+        let cut = Cut::new(&solids[2], &others).unwrap();
+        assert!(cut.middle.triangles.len() > leaves[0].triangles.len() / 2);
+        assert!(cut.ends.iter().all(|e| check_mesh(&e.clone().rounded_to_f32()).is_printable()));
+        same(&links, &leaves);
+    }
+
+    /// What stands in a leaf's way is united with it, wherever it is; a leaf that ends in the open keeps its end.
+    #[test]
+    fn whatever_touches_is_united() {
+        same(&[block(-2.0), block(22.0), block(9.0)], &[leaf(0.5)]);
+        same(&[block(-2.0)], &[leaf(0.5)]);
+        // All of it is inside.
+        let large = Slot::capsule(Vector3::new(-5.0, 2.0, 0.0), Vector3::new(25.0, 2.0, 0.0), 12.0);
+        same(&[large.mesh(&Facets::default(), 0.0)], &[leaf(0.5)]);
+    }
+
+    #[test]
+    fn a_section_that_is_not_there_as_it_was_is_told() {
+        let (links, leaf) = ([block(-2.0), block(22.0)], leaf(0.5));
+        let solids: Vec<Solid<'_>> = links.iter().map(Solid::new).collect();
+        let cut = Cut::new(&Solid::new(&leaf), &solids.iter().collect::<Vec<_>>()).unwrap();
+        let mut whole = Mesh::default();
+        cut.ends.iter().for_each(|e| whole.append(e));
+        let mut moved = whole.clone();
+        moved.vertices.iter_mut().find(|p| cut.middle.vertices.contains(p)).unwrap().x += 1e-9;
+        assert!(grafted(&mut whole, std::slice::from_ref(&cut)));
+        assert!(check_mesh(&whole.rounded_to_f32()).is_printable());
+        assert!(!grafted(&mut moved, &[cut]));
+    }
+}

@@ -2,11 +2,12 @@
 //! that bending pulls along printed lines and not layers apart, and its width stands upright, so that its thickness is
 //! drawn and not stacked. What lies otherwise is named.
 
-use super::check::check_mesh;
+use super::check::{MeshFacts, check_mesh};
 use super::mesh::Mesh;
 use super::parts::FlexureSolid;
 use super::sweep::tangents;
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 
 /// Sine of the angle by which a flexure may leave its layer. A leaf of 20 mm then rises by 1 mm.
 const IN_LAYER: f64 = 0.05;
@@ -55,23 +56,25 @@ pub enum Posture {
 }
 
 impl Lying {
-    /// The part on the bed, with coordinates exact in `f32`. A part that is only moved or turned by right angles keeps its
-    /// shape to the last bit. Where another is, its coordinates round otherwise, and slender triangles may then cross: of
+    /// The part on the bed, with coordinates exact in `f32`, and what it is like there. A part that is only moved or turned by right angles
+    /// keeps its shape to the last bit. Where another is, its coordinates round otherwise, and slender triangles may then cross: of
     /// the first few places beside each other, all nearer than a printer resolves, the first where the part is sound is
     /// taken (the first of all where none is, or the part is not sound where it was made).
-    pub fn mesh(&self, mesh: &Mesh) -> Mesh {
+    pub fn mesh(&self, mesh: &Mesh) -> (Mesh, MeshFacts) {
         let placed = |k: usize| {
             let shift = Vector3::new(1.0, 1.0, 0.25) * (k as f64 * ASIDE_MM);
             let place = |p: &Vector3<f64>| self.rotation * p + self.translation + shift;
             let vertices = mesh.vertices.iter().map(place).collect();
-            Mesh { vertices, triangles: mesh.triangles.clone() }.rounded_to_f32().sorted()
+            let lying = Mesh { vertices, triangles: mesh.triangles.clone() }.rounded_to_f32().sorted();
+            let facts = check_mesh(&lying);
+            (lying, facts)
         };
         let first = placed(0);
         let exact = self.rotation.iter().all(|x| *x == 0.0 || x.abs() == 1.0);
-        if exact || check_mesh(&first).is_sound() {
+        if exact || first.1.is_sound() {
             return first;
         }
-        (1..PLACES).map(placed).find(|m| check_mesh(m).is_sound()).unwrap_or(first)
+        (1..PLACES).map(placed).find(|(_, facts)| facts.is_sound()).unwrap_or(first)
     }
 
     /// The flexures that leave the layers, with their angles (rad).
@@ -87,29 +90,24 @@ impl Lying {
 /// largest face, then as drawn. `bed_mm` turns it by a right angle where it would not fit otherwise.
 pub fn lie(mesh: &Mesh, flexures: &[&FlexureSolid], bed_mm: Option<[f64; 3]>) -> Option<Lying> {
     mesh.bounding_box()?;
-    let mut best: Option<(Vec<i64>, Vector3<f64>)> = None;
-    for (k, up) in candidates(flexures).iter().enumerate() {
+    let whole = |x: f64, step: f64| (x / step).round() as i64;
+    let asked = |up: &Vector3<f64>| {
         let postures: Vec<Posture> = flexures.iter().map(|f| posture(f, up)).collect();
         let leaning: Vec<f64> = postures
             .iter()
             .filter_map(|p| if let Posture::Leaning(a) = p { Some(*a) } else { None })
             .collect();
         let standing = postures.iter().filter(|p| **p == Posture::Standing).count();
+        [leaning.len() as i64, whole(leaning.iter().sum::<f64>(), LEAN_STEP), -(standing as i64)]
+    };
+    // One question after the other, of those that are left: the last ones look at the whole mesh.
+    let left = least(candidates(flexures), asked);
+    let left = least(left, |up| {
         let (low, high) = extent(mesh, up);
-        let whole = |x: f64, step: f64| (x / step).round() as i64;
-        let key = vec![
-            leaning.len() as i64,
-            whole(leaning.iter().sum::<f64>(), LEAN_STEP),
-            -(standing as i64),
-            whole(high - low, EQUAL_MM),
-            -whole(contact(mesh, up, low), 1.0),
-            k as i64,
-        ];
-        if best.as_ref().is_none_or(|(b, _)| key < *b) {
-            best = Some((key, *up));
-        }
-    }
-    let (_, up) = best?;
+        whole(high - low, EQUAL_MM)
+    });
+    let left = least(left, |up| -whole(contact(mesh, up, extent(mesh, up).0), 1.0));
+    let up = *left.first()?;
     let mut rotation = upright(&up);
     let size = |r: &Matrix3<f64>| {
         let along = |row: usize| extent(mesh, &r.row(row).transpose());
@@ -133,6 +131,19 @@ pub fn lie(mesh: &Mesh, flexures: &[&FlexureSolid], bed_mm: Option<[f64; 3]>) ->
         contact_mm2: contact(mesh, &up, extent(mesh, &up).0),
         flexures: flexures.iter().map(|f| posture(f, &up)).collect(),
     })
+}
+
+/// Those of some directions of which a measure is least, in their order; nothing is measured of one alone.
+fn least<K: Ord + Send>(
+    of: Vec<Vector3<f64>>,
+    measure: impl Fn(&Vector3<f64>) -> K + Sync + Send,
+) -> Vec<Vector3<f64>> {
+    if of.len() < 2 {
+        return of;
+    }
+    let measured: Vec<K> = of.par_iter().map(measure).collect();
+    let best = measured.iter().min();
+    of.into_iter().zip(&measured).filter(|(_, key)| Some(*key) == best).map(|(v, _)| v).collect()
 }
 
 /// Directions to try: as drawn first, then the other axes, then what flexures ask for.
@@ -240,9 +251,9 @@ mod tests {
         let lying = lie(&mesh, &leaves.iter().collect::<Vec<_>>(), None).unwrap();
         assert_eq!(lying.rotation, Matrix3::identity());
         assert_eq!(lying.flexures, [Posture::Standing]);
-        let (low, high) = lying.mesh(&mesh).bounding_box().unwrap();
+        let (low, high) = lying.mesh(&mesh).0.bounding_box().unwrap();
         assert!(low.norm() < 1e-5 && (high - lying.size_mm).norm() < 1e-5, "{low} {high}");
-        assert!((lying.mesh(&mesh).volume_mm3() - mesh.volume_mm3()).abs() < 1e-3 * mesh.volume_mm3());
+        assert!((lying.mesh(&mesh).0.volume_mm3() - mesh.volume_mm3()).abs() < 1e-3 * mesh.volume_mm3());
     }
 
     #[test]

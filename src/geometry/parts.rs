@@ -13,7 +13,7 @@ use super::graft::united;
 use super::link::{BodyPlan, plan_body};
 use super::mesh::Mesh;
 use super::slot::Facets;
-use super::tidy::{SHORT_EDGE_MM, without_short_edges};
+use super::tidy::finished;
 use super::union::{BooleanError, subtract_all, union_all};
 use crate::math::Pose;
 use crate::rod::SectionShape;
@@ -328,7 +328,7 @@ pub(super) fn build_part(
     let flexures: Vec<Mesh> =
         input.flexures.iter().filter(inside).map(|f| f.mesh(input.facets.around)).collect();
     let united = united(&links, &flexures).map_err(failed)?;
-    let mesh = without_short_edges(&united, SHORT_EDGE_MM).rounded_to_f32().sorted();
+    let mesh = finished(&united);
     let notes = bodies.iter().flat_map(|i| plans[*i].notes.iter().cloned()).collect();
     Ok(Part { name, bodies: bodies.to_vec(), mesh, links, notes })
 }

@@ -5,8 +5,9 @@ use super::distance::separation;
 use super::field::Field;
 use super::link::{BodyPlan, Role};
 use super::skeleton::connect;
+use super::tidy::{SHORT_EDGE_MM, finished, without_short_edges};
 use super::union::{BooleanError, subtract_all, union_all};
-use super::wall::{Wall, least_wall};
+use super::wall::{Left, Wall};
 use super::{Facets, Mesh, Probe, Slot};
 use nalgebra::Vector3;
 use std::f64::consts::PI;
@@ -328,7 +329,7 @@ fn the_least_wall_of_a_notched_bar() {
         slots: vec![(Role::Bar, bar), (Role::Boss, boss(0.0)), (Role::Boss, boss(40.0))],
         ..BodyPlan::default()
     };
-    let whole = least_wall(&plan, &[]);
+    let whole = Left::new(&plan).least_wall();
     assert!(matches!(whole, Wall::Least(w) if (w - 8.0).abs() < 0.4), "{whole:?}");
     for left in [4.0, 1.6, 1.0] {
         let mut notch = Field::new(&v(10.0, -8.0, -8.0), &v(30.0, 8.0, 12.0), 0.6, 1.0);
@@ -339,7 +340,7 @@ fn the_least_wall_of_a_notched_bar() {
             let lift = v(0.0, 0.0, up as f64);
             notch.add(&Slot::capsule(start + lift, end + lift, 1.5), 0.0, 1.2);
         }
-        let wall = least_wall(&plan, &[(0, &notch)]);
+        let wall = Left::new(&plan).without(0, &notch).least_wall();
         // Beyond 2 mm, where the notch's own field ends, it is only known to be as thick.
         let right = |w: f64| (w - left.min(2.2)).abs() < 0.3;
         assert!(matches!(wall, Wall::Least(w) if right(w)), "{left}: {wall:?}");
@@ -348,7 +349,7 @@ fn the_least_wall_of_a_notched_bar() {
         let far = v(-150.0, 300.0, 250.0);
         large.slots.push((Role::Bar, Slot::capsule(v(0.0, 0.0, 0.0), far, 4.0)));
         large.slots.push((Role::Boss, Slot::capsule(far, far, 4.5)));
-        let wall = least_wall(&large, &[(0, &notch)]);
+        let wall = Left::new(&large).without(0, &notch).least_wall();
         assert!(matches!(wall, Wall::Least(w) if right(w)), "{left}: {wall:?} in a large body");
     }
     let mut through = Field::new(&v(10.0, -8.0, -8.0), &v(30.0, 8.0, 8.0), 0.6, 1.0);
@@ -356,5 +357,39 @@ fn the_least_wall_of_a_notched_bar() {
         let lift = f64::from(up);
         through.add(&Slot::capsule(v(20.0, -7.0, lift), v(20.0, 7.0, lift), 1.0), 0.0, 1.2);
     }
-    assert_eq!(least_wall(&plan, &[(0, &through)]), Wall::Apart);
+    assert_eq!(Left::new(&plan).without(0, &through).least_wall(), Wall::Apart);
+}
+
+/// A box at 200 mm, turned, one edge of which has a vertex on one side of it only, so near to a corner and to the edge that the triangle between them
+/// is a sliver that rounding can turn over.
+fn split_edge(turn: f64) -> Mesh {
+    let rotation = nalgebra::Rotation3::from_euler_angles(0.3 + turn, 0.7 * turn, 1.1 - turn);
+    let corner = |x: f64, y: f64, z: f64| rotation * Vector3::new(x, y, z) + Vector3::new(170.0, 200.0, 60.0);
+    let mut vertices: Vec<Vector3<f64>> = (0..8)
+        .map(|k| corner(f64::from(k & 1) * 0.07, f64::from(k >> 1 & 1) * 3.0, f64::from(k >> 2) * 2.0))
+        .collect();
+    // On the edge from 0 to 4, longer than what is collapsed in any case.
+    vertices.push(corner(1e-7, 1e-7, 1.05 * SHORT_EDGE_MM));
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [1, 3, 7, 5]];
+    let mut triangles: Vec<[usize; 3]> =
+        quads.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
+    // The side between 0, 4, 6, 2, and the sliver at its edge.
+    triangles.extend([[0, 8, 2], [8, 4, 6], [8, 6, 2], [0, 4, 8]]);
+    Mesh { vertices, triangles }
+}
+
+#[test]
+fn crossings_that_come_from_rounding_are_mended() {
+    let turned = |k: i32| split_edge(0.37 * f64::from(k));
+    let rounded = (0..200).filter(|k| {
+        let mesh = turned(*k);
+        assert!(check_mesh(&mesh).closed && check_mesh(&mesh).oriented);
+        !check_mesh(&without_short_edges(&mesh, SHORT_EDGE_MM).rounded_to_f32()).is_printable()
+    });
+    assert!(rounded.count() > 20);
+    for k in 0..200 {
+        let facts = check_mesh(&finished(&turned(k)));
+        assert!(facts.is_printable(), "{k}: {facts:?}");
+        assert!((facts.volume_mm3 - 0.42).abs() < 1e-3, "{facts:?}");
+    }
 }

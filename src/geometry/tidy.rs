@@ -2,8 +2,10 @@
 //! to `f32`, their slivers could turn over. An edge is collapsed only if the surface stays a manifold
 //! (link condition, Dey et al. 1999) and no neighbouring triangle turns.
 
+use super::check::crossing_pairs;
 use super::mesh::Mesh;
 use nalgebra::Vector3;
+use std::collections::BTreeSet;
 
 /// Edges shorter than this are collapsed, mm: a hundredth of what a printer resolves.
 pub const SHORT_EDGE_MM: f64 = 0.01;
@@ -17,18 +19,38 @@ const LEAST_COSINE: f64 = 0.97;
 /// Passes over all edges and slivers; the next finds what the last made possible. All examples are done after five.
 const PASSES: usize = 8;
 
+/// Where rounding lets triangles cross, edges up to twice, four, … times as long are collapsed, this many times at most: Klann's frame is
+/// done after one. The longest, 0.08 mm, is still below what a printer resolves.
+const MENDS: i32 = 3;
+
+/// A united solid as it is written: without short edges and slivers as far as they can go, exact in `f32`, sorted; and free of crossings where
+/// these come from rounding.
+pub fn finished(united: &Mesh) -> Mesh {
+    let mut work = Work::new(united);
+    work.tidy(&|_, _| SHORT_EDGE_MM);
+    let mut mesh = work.mesh().rounded_to_f32().sorted();
+    for k in 1..=MENDS {
+        let near: BTreeSet<usize> = crossing_pairs(&mesh)
+            .iter()
+            .flat_map(|(s, t)| [mesh.triangles[*s], mesh.triangles[*t]])
+            .flatten()
+            .flat_map(|i| work.within(&mesh.vertices[i], SHORT_EDGE_MM))
+            .collect();
+        if near.is_empty() {
+            break;
+        }
+        let longer = SHORT_EDGE_MM * 2f64.powi(k);
+        work.tidy(&|i, j| if near.contains(&i) || near.contains(&j) { longer } else { SHORT_EDGE_MM });
+        mesh = work.mesh().rounded_to_f32().sorted();
+    }
+    mesh
+}
+
 /// The mesh without its short edges, as far as they can go, and without slivers.
 pub fn without_short_edges(mesh: &Mesh, limit_mm: f64) -> Mesh {
     let mut work = Work::new(mesh);
-    for _ in 0..PASSES {
-        let collapsed = work.pass(limit_mm);
-        if !work.flip_flat_triangles() && !collapsed {
-            break;
-        }
-    }
-    let mut out = Mesh { vertices: work.vertices, triangles: work.triangles.into_iter().flatten().collect() };
-    out.drop_unused_vertices();
-    out
+    work.tidy(&|_, _| limit_mm);
+    work.mesh()
 }
 
 struct Work {
@@ -48,14 +70,37 @@ impl Work {
         Self { vertices: mesh.vertices.clone(), triangles, fans }
     }
 
+    /// Passes over all edges and slivers until nothing changes; `limit_mm` says of two ends how short an edge has to go.
+    fn tidy(&mut self, limit_mm: &dyn Fn(usize, usize) -> f64) {
+        for _ in 0..PASSES {
+            let collapsed = self.pass(limit_mm);
+            if !self.flip_flat_triangles() && !collapsed {
+                break;
+            }
+        }
+    }
+
+    fn mesh(&self) -> Mesh {
+        let triangles = self.triangles.iter().flatten().copied().collect();
+        let mut out = Mesh { vertices: self.vertices.clone(), triangles };
+        out.drop_unused_vertices();
+        out
+    }
+
+    /// Vertices around a point.
+    fn within(&self, p: &Vector3<f64>, radius_mm: f64) -> Vec<usize> {
+        let near = |(i, q): (usize, &Vector3<f64>)| ((q - p).norm() < radius_mm).then_some(i);
+        self.vertices.iter().enumerate().filter_map(near).collect()
+    }
+
     /// Tries every short edge once, shortest first; true if any went.
-    fn pass(&mut self, limit_mm: f64) -> bool {
+    fn pass(&mut self, limit_mm: &dyn Fn(usize, usize) -> f64) -> bool {
         let mut short: Vec<(f64, usize, usize)> = Vec::new();
         for ids in self.triangles.iter().flatten() {
             for k in 0..3 {
                 let (i, j) = (ids[k], ids[(k + 1) % 3]);
                 let length = (self.vertices[i] - self.vertices[j]).norm();
-                if i < j && length < limit_mm {
+                if i < j && length < limit_mm(i, j) {
                     short.push((length, i, j));
                 }
             }

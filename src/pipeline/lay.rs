@@ -6,7 +6,7 @@ use super::scene::Moving;
 use crate::diagnostic::Diagnostic;
 use crate::emit::outlines::layer_name;
 use crate::emit::plate::{Laid, Leaf, Plate};
-use crate::geometry::{Band, FlexureSolid, Posture, lie};
+use crate::geometry::{Band, FlexureSolid, Mesh, MeshFacts, Posture, lie};
 use crate::ir::{Assembly, Origin};
 use rayon::prelude::*;
 
@@ -27,9 +27,11 @@ pub fn plate(assembly: &Assembly, moving: &[Moving], printed: &[Printed]) -> Pla
         };
         let flexures: Vec<FlexureSolid> = part.flexures.iter().filter_map(placed).collect();
         let lying = lie(&part.mesh, &flexures.iter().collect::<Vec<_>>(), process.machine.bed_mm)?;
+        let (mesh, facts) = lying.mesh(&part.mesh);
         Some(Laid {
             name: part.name.clone(),
-            mesh: lying.mesh(&part.mesh),
+            mesh,
+            facts,
             lying,
             material,
             process,
@@ -69,11 +71,40 @@ pub fn uneven(plate: &Plate, cut: &[Vec<Band>], at: Origin) -> Vec<Diagnostic> {
     plate.parts.iter().zip(cut).filter_map(worst).map(told).collect()
 }
 
-/// Parts that do not fit, and flexures that leave the layers of a process that is weak across them.
+/// A part as written that is no solid, or not one: what the user would otherwise learn from the slicer.
+fn unsound(name: &str, mesh: &Mesh, facts: &MeshFacts, at: Origin) -> Option<Diagnostic> {
+    if facts.is_printable() {
+        return None;
+    }
+    let crossing = || {
+        let corner = |(t, _): &(usize, usize)| mesh.vertices.get(*mesh.triangles.get(*t)?.first()?);
+        let place = facts.examples.first().and_then(corner);
+        let place = place.map(|p| format!(", first near ({:.1}, {:.1}, {:.1}) mm on the bed", p.x, p.y, p.z));
+        format!(
+            "crosses itself in {} pairs of triangles{}",
+            facts.self_intersections,
+            place.unwrap_or_default()
+        )
+    };
+    let what = match facts {
+        f if !f.closed || !f.oriented => "is not closed".to_string(),
+        f if f.self_intersections > 0 => crossing(),
+        f if f.flat > 0 || f.pinched > 0 => "touches itself in single points".to_string(),
+        f if f.components > 1 => format!("is in {} pieces", f.components),
+        _ => "is inside out".to_string(),
+    };
+    let found = Diagnostic::warning("W0659", format!("`{name}` is not one sound solid"), at)
+        .label(format!("its surface {what}"))
+        .help("look at that place in the slicer, which may repair it; what a little other layer, point or thickness moves elsewhere is gone");
+    Some(found)
+}
+
+/// Parts that are not sound or do not fit, and flexures that leave the layers of a process that is weak across them.
 pub fn findings(assembly: &Assembly, plate: &Plate, printed: &[Printed]) -> Vec<Diagnostic> {
     let mut found = Vec::new();
     for part in &plate.parts {
         let at = printed.iter().find(|p| p.name == part.name).map_or(assembly.origin, |p| p.at);
+        found.extend(unsound(&part.name, &part.mesh, &part.facts, at));
         let (process, size) = (&part.process, part.lying.size_mm);
         if let (Some(false), Some([x, y, z])) = (part.fits(), process.machine.bed_mm) {
             let message = format!("`{}` does not fit on the bed of `{}`", part.name, process.name);
@@ -112,4 +143,41 @@ pub fn findings(assembly: &Assembly, plate: &Plate, printed: &[Printed]) -> Vec<
         );
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Facets, Slot, check_mesh};
+    use nalgebra::Vector3;
+
+    /// What is told of balls around these places.
+    fn told(places: &[f64], spoil: impl Fn(&mut Mesh)) -> String {
+        let mut mesh = Mesh::default();
+        for x in places {
+            let at = Vector3::new(*x, 0.0, 0.0);
+            mesh.append(&Slot::capsule(at, at + Vector3::x() * 1e-3, 5.0).mesh(&Facets::default(), 0.0));
+        }
+        spoil(&mut mesh);
+        let found = unsound("arm", &mesh, &check_mesh(&mesh), Origin::default());
+        found
+            .map(|d| {
+                format!("{} {}", d.message, d.labels.iter().map(|l| l.text.as_str()).collect::<String>())
+            })
+            .unwrap_or_default()
+    }
+
+    #[test]
+    fn a_part_that_is_no_sound_solid_is_told() {
+        assert_eq!(told(&[0.0], |_| ()), "");
+        assert!(
+            told(&[0.0, 20.0], |_| ()).ends_with("`arm` is not one sound solid its surface is in 2 pieces")
+        );
+        let crossing = told(&[0.0, 6.0], |_| ());
+        assert!(crossing.contains("crosses itself in ") && crossing.contains("first near ("), "{crossing}");
+        assert!(told(&[0.0], |m| m.triangles.truncate(9)).ends_with("is not closed"));
+        assert!(
+            told(&[0.0], |m| m.triangles.iter_mut().for_each(|t| t.swap(0, 1))).ends_with("is inside out")
+        );
+    }
 }
