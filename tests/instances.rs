@@ -12,7 +12,7 @@ use flexura::geometry::{
 use flexura::ir::{Assembly, Design, Placement, Quantity, Realization};
 use flexura::kinematics::solve_motion;
 use flexura::pipeline::{self, Artefact, Between, BuildOutcome, Checked, Compiler, Failed, Files, Iteration};
-use flexura::pipeline::{Parts, Request, Show, Simulation, Solved, Stages};
+use flexura::pipeline::{Parts, Plans, Request, Show, Simulation, Solved, Stages};
 use nalgebra::Vector3;
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -64,8 +64,8 @@ impl Stages for Counted {
         self.simulated.set(self.simulated.get() + 1);
         self.compiler.simulate(design, values)
     }
-    fn between(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Between {
-        self.compiler.between(assembly, values)
+    fn between(&self, assembly: &Assembly, simulations: &[Simulation]) -> Between {
+        self.compiler.between(assembly, simulations)
     }
     fn optimize(
         &self,
@@ -77,8 +77,8 @@ impl Stages for Counted {
         self.optimized.set(self.optimized.get() + 1);
         self.compiler.optimize(design, start, told, cancel)
     }
-    fn parts(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Result<Parts, Failed> {
-        self.compiler.parts(assembly, values)
+    fn parts(&self, assembly: &Assembly, values: &[Vec<f64>], plans: &Plans) -> Result<Parts, Failed> {
+        self.compiler.parts(assembly, values, plans)
     }
 }
 
@@ -456,17 +456,16 @@ fn a_common_body_makes_way_for_the_flexures_of_each_instance() {
         ..input.clone()
     };
     let block_parts = build_parts(&block).unwrap();
-    let whole = join(&[(&input, &alone, vec![0, 1]), (&block, &block_parts, vec![0])].map(
-        |(input, parts, bodies)| Share {
+    let shares =
+        [(&input, &alone, vec![0, 1]), (&block, &block_parts, vec![0])].map(|(input, parts, bodies)| Share {
             input,
             plans: &parts.plans,
             carving: &parts.carving,
             states: Vec::new(),
             placement: Placement::IDENTITY,
             bodies,
-        },
-    ))
-    .unwrap();
+        });
+    let whole = join(&shares, None).unwrap();
     let cut = whole.carving.cuts.iter().find(|c| (c.body, c.flexure) == (0, 0)).unwrap();
     assert!(cut.depth_mm > 0.5 && cut.made, "{cut:?}");
     let solids = whole.build(&[0, 1]).unwrap().0;
@@ -623,7 +622,7 @@ fn a_bore_stays_open_in_a_merged_body() {
             placement: place(x),
             bodies: vec![0],
         });
-        join(&shares).unwrap().build(&[0]).unwrap().0
+        join(&shares, None).unwrap().build(&[0]).unwrap().0
     };
     for x in [0.5, 12.0] {
         let solids = united(x);

@@ -14,7 +14,7 @@ use super::parts::{FlexureSolid, GeometryError, PartsInput};
 use super::slot::Slot;
 use super::solid::surfaces;
 use super::union::{BooleanError, subtract_all, union_all};
-use super::wall::{Wall, least_wall};
+use super::wall::{Left, Wall};
 use crate::math::Pose;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -262,18 +262,25 @@ fn carve_body(
     states: &[MovedState],
 ) -> Result<(Vec<Cut>, Option<Mesh>), GeometryError> {
     let attached = |f: &FlexureSolid| f.bodies.0 == body || f.bodies.1 == body;
-    let mut cuts = Vec::new();
-    let mut tools: Vec<(usize, Field, Mesh)> = Vec::new();
-    // The least wall with these tools; it takes longer than all the rest.
-    let mut wall: Option<Wall> = None;
-    for flexure in (0..input.flexures.len()).filter(|f| attached(&input.flexures[*f])) {
-        let shapes = shapes(input, flexure, body, states);
-        let Some(mut cut) = meets(input, plan, body, flexure, &shapes) else { continue };
-        let (field, tool) = swept(input, plan, &cut, &shapes);
-        tools.push((flexure, field, tool));
-        let fields: Vec<(usize, &Field)> = tools.iter().map(|(f, field, _)| (*f, field)).collect();
-        let before = wall.unwrap_or_else(|| least_wall(plan, &fields[..fields.len() - 1]));
-        let after = least_wall(plan, &fields);
+    let own: Vec<usize> = (0..input.flexures.len()).filter(|f| attached(&input.flexures[*f])).collect();
+    let met: Vec<(Cut, Field, Mesh)> = own
+        .par_iter()
+        .filter_map(|flexure| {
+            let shapes = shapes(input, *flexure, body, states);
+            let cut = meets(input, plan, body, *flexure, &shapes)?;
+            let (field, tool) = swept(input, plan, &cut, &shapes);
+            Some((cut, field, tool))
+        })
+        .collect();
+    if met.is_empty() {
+        return Ok((Vec::new(), None));
+    }
+    let (mut cuts, mut tools) = (Vec::new(), Vec::new());
+    let mut left = Left::new(plan);
+    let mut before = left.least_wall();
+    for (mut cut, field, tool) in met {
+        let without = left.without(cut.flexure, &field);
+        let after = without.least_wall();
         cut.wall_mm = match after {
             Wall::Apart => None,
             Wall::Least(wall) => Some(wall),
@@ -284,9 +291,9 @@ fn carve_body(
             (_, after) => after == Wall::Apart,
         };
         cut.made = !thin;
-        wall = Some(if thin { before } else { after });
-        if thin {
-            tools.pop();
+        if !thin {
+            (left, before) = (without, after);
+            tools.push((cut.flexure, tool));
         }
         cuts.push(cut);
     }
@@ -299,9 +306,9 @@ fn carve_body(
 }
 
 /// The link without what is swept; every stub keeps clear of the other flexures only.
-fn carved(input: &PartsInput, plan: &BodyPlan, tools: &[(usize, Field, Mesh)]) -> Result<Mesh, BooleanError> {
+fn carved(input: &PartsInput, plan: &BodyPlan, tools: &[(usize, Mesh)]) -> Result<Mesh, BooleanError> {
     let meshes = plan.meshes(&input.facets);
-    let kept = |role: &Role| tools.iter().find(|(f, _, _)| *role == Role::Stub(*f)).map(|t| t.0);
+    let kept = |role: &Role| tools.iter().find(|(f, _)| *role == Role::Stub(*f)).map(|t| t.0);
     let rest: Vec<Mesh> = plan
         .slots
         .iter()
@@ -310,7 +317,7 @@ fn carved(input: &PartsInput, plan: &BodyPlan, tools: &[(usize, Field, Mesh)]) -
         .map(|(_, m)| m.clone())
         .chain(plan.solids.iter().map(|s| s.mesh()))
         .collect();
-    let all: Vec<Mesh> = tools.iter().map(|t| t.2.clone()).collect();
+    let all: Vec<Mesh> = tools.iter().map(|t| t.1.clone()).collect();
     let mut pieces = Vec::new();
     if !rest.is_empty() {
         pieces.push(subtract_all(&union_all(&rest)?, &all)?);
@@ -324,7 +331,7 @@ fn carved(input: &PartsInput, plan: &BodyPlan, tools: &[(usize, Field, Mesh)]) -
                 .is_some_and(|(low, high)| (center.sup(&low).inf(&high) - center).norm() < radius)
         };
         let others: Vec<Mesh> =
-            tools.iter().filter(|t| t.0 != own && near(&t.2)).map(|t| t.2.clone()).collect();
+            tools.iter().filter(|t| t.0 != own && near(&t.1)).map(|t| t.1.clone()).collect();
         pieces.push(subtract_all(mesh, &others)?);
     }
     subtract_all(&union_all(&pieces)?, &plan.bore_meshes(&input.facets))

@@ -95,6 +95,40 @@ fn segment_meets_in_plane(p: &Point, q: &Point, t: &[Point; 3], dropped: usize) 
     inside(p) || inside(q) || (0..3).any(|k| crosses(&t[k], &t[(k + 1) % 3]))
 }
 
+/// Directions in which neighbours at a corner are parted first: axes and diagonals.
+const WAYS: [Point; 13] = [
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+    [1, 1, 0],
+    [1, -1, 0],
+    [1, 0, 1],
+    [1, 0, -1],
+    [0, 1, 1],
+    [0, 1, -1],
+    [1, 1, 1],
+    [1, 1, -1],
+    [1, -1, 1],
+    [-1, 1, 1],
+];
+
+/// Whether two triangles with one corner in common lie on both sides of a plane through it that one of them leaves there: most
+/// neighbours do for one of a few planes, which costs less than to ask where they meet.
+fn parted(s_ids: &[usize; 3], s: &[Point; 3], t_ids: &[usize; 3], t: &[Point; 3]) -> bool {
+    let Some(k) = (0..3).find(|k| t_ids.contains(&s_ids[*k])) else { return false };
+    let Some(l) = (0..3).find(|l| t_ids[*l] == s_ids[k]) else { return false };
+    let from = |q: &Point| [q[0] - s[k][0], q[1] - s[k][1], q[2] - s[k][2]];
+    let corners = [&s[(k + 1) % 3], &s[(k + 2) % 3], &t[(l + 1) % 3], &t[(l + 2) % 3]].map(from);
+    WAYS.iter().any(|way| {
+        // Below 2^42.
+        let [a, b, c, d] = corners.map(|q| q[0] * way[0] + q[1] * way[1] + q[2] * way[2]);
+        let (low, high) = ((a.max(b), a.min(b)), (c.max(d), c.min(d)));
+        let below = low.0 <= 0 && high.1 >= 0 && (low.0 < 0 || high.1 > 0);
+        let above = low.1 >= 0 && high.0 <= 0 && (low.1 > 0 || high.0 < 0);
+        below || above
+    })
+}
+
 /// Whether two triangles with areas have more in common than the corners given by the same index: two neighbours more than
 /// their edge, others more than their corner.
 pub fn triangles_meet(s_ids: &[usize; 3], s: &[Point; 3], t_ids: &[usize; 3], t: &[Point; 3]) -> bool {
@@ -115,6 +149,7 @@ pub fn triangles_meet(s_ids: &[usize; 3], s: &[Point; 3], t_ids: &[usize; 3], t:
             (0..3).any(|k| segment_meets(&s[k], &s[(k + 1) % 3], t))
                 || (0..3).any(|k| segment_meets(&t[k], &t[(k + 1) % 3], s))
         }
+        1 if parted(s_ids, s, t_ids, t) => false,
         1 => {
             let opposite = |ids: &[usize; 3], others: &[usize; 3], x: &[Point; 3], y: &[Point; 3]| {
                 common(ids, others).is_some_and(|k| segment_meets(&x[(k + 1) % 3], &x[(k + 2) % 3], y))
@@ -166,6 +201,30 @@ mod tests {
             assert_eq!(segment_meets(&p, &q, &T), meets, "{p:?} {q:?}");
             assert_eq!(segment_meets(&q, &p, &T), meets, "{q:?} {p:?}");
         }
+    }
+
+    /// Whatever is parted does not meet, and most that does not meet is parted.
+    #[test]
+    fn parted_neighbours_have_their_corner_only() {
+        let noise = |k: usize| ((k as f64 * 12.9898).sin() * 43758.5453).rem_euclid(1.0);
+        // On few places, so that much of it is aligned.
+        let place = |k: usize| [3 * k, 3 * k + 1, 3 * k + 2].map(|k| (noise(k) * 7.0) as i64 - 3);
+        let (mut parts, mut apart, mut meet) = (0, 0, 0);
+        for k in 0..20_000 {
+            let c = place(5 * k);
+            let (s, t) = ([c, place(5 * k + 1), place(5 * k + 2)], [place(5 * k + 3), c, place(5 * k + 4)]);
+            if is_flat(&s) || is_flat(&t) {
+                continue;
+            }
+            let meets = segment_meets(&s[1], &s[2], &t) || segment_meets(&t[2], &t[0], &s);
+            let parted = parted(&[0, 1, 2], &s, &[3, 0, 4], &t);
+            assert!(!(meets && parted), "{s:?} {t:?}");
+            assert_eq!(triangles_meet(&[0, 1, 2], &s, &[3, 0, 4], &t), meets);
+            parts += usize::from(parted);
+            apart += usize::from(!meets);
+            meet += usize::from(meets);
+        }
+        assert!(meet > 1000 && parts > apart / 2, "{parts} of {apart} are parted, {meet} meet");
     }
 
     #[test]

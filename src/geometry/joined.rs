@@ -165,11 +165,11 @@ impl Frame {
     }
 }
 
-/// Puts instances together.
+/// Puts instances together. Where it is known how their links are `carved`, that is not done again.
 ///
 /// # Errors
 /// A failure of the boolean kernel where a common link is carved.
-pub fn join(shares: &[Share<'_>]) -> Result<Whole, GeometryError> {
+pub fn join(shares: &[Share<'_>], carved: Option<&Carving>) -> Result<Whole, GeometryError> {
     let count = shares.iter().flat_map(|s| &s.bodies).max().map_or(0, |last| last + 1);
     let mut bodies: Vec<Vec<(usize, usize)>> = vec![Vec::new(); count];
     let mut named: Vec<BodySolid> = vec![BodySolid::default(); count];
@@ -211,10 +211,16 @@ pub fn join(shares: &[Share<'_>]) -> Result<Whole, GeometryError> {
     };
     let states = states(&placed, count);
     let plans: Vec<BodyPlan> = plans.into_iter().map(united).collect();
-    let common: Vec<usize> = (0..count).filter(|b| bodies[*b].len() > 1).collect();
-    let mut carving = carve_bodies(&input, &plans, &states, &common)?;
-    carving.cuts.extend(own.cuts);
-    carving.links.extend(own.links);
+    let carving = match carved {
+        Some(known) => known.clone(),
+        None => {
+            let common: Vec<usize> = (0..count).filter(|b| bodies[*b].len() > 1).collect();
+            let mut carving = carve_bodies(&input, &plans, &states, &common)?;
+            carving.cuts.extend(own.cuts);
+            carving.links.extend(own.links);
+            carving
+        }
+    };
     Ok(Whole { input, plans, states, carving, bodies, flexures })
 }
 

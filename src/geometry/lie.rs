@@ -7,6 +7,7 @@ use super::mesh::Mesh;
 use super::parts::FlexureSolid;
 use super::sweep::tangents;
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 
 /// Sine of the angle by which a flexure may leave its layer. A leaf of 20 mm then rises by 1 mm.
 const IN_LAYER: f64 = 0.05;
@@ -89,29 +90,24 @@ impl Lying {
 /// largest face, then as drawn. `bed_mm` turns it by a right angle where it would not fit otherwise.
 pub fn lie(mesh: &Mesh, flexures: &[&FlexureSolid], bed_mm: Option<[f64; 3]>) -> Option<Lying> {
     mesh.bounding_box()?;
-    let mut best: Option<(Vec<i64>, Vector3<f64>)> = None;
-    for (k, up) in candidates(flexures).iter().enumerate() {
+    let whole = |x: f64, step: f64| (x / step).round() as i64;
+    let asked = |up: &Vector3<f64>| {
         let postures: Vec<Posture> = flexures.iter().map(|f| posture(f, up)).collect();
         let leaning: Vec<f64> = postures
             .iter()
             .filter_map(|p| if let Posture::Leaning(a) = p { Some(*a) } else { None })
             .collect();
         let standing = postures.iter().filter(|p| **p == Posture::Standing).count();
+        [leaning.len() as i64, whole(leaning.iter().sum::<f64>(), LEAN_STEP), -(standing as i64)]
+    };
+    // One question after the other, of those that are left: the last ones look at the whole mesh.
+    let left = least(candidates(flexures), asked);
+    let left = least(left, |up| {
         let (low, high) = extent(mesh, up);
-        let whole = |x: f64, step: f64| (x / step).round() as i64;
-        let key = vec![
-            leaning.len() as i64,
-            whole(leaning.iter().sum::<f64>(), LEAN_STEP),
-            -(standing as i64),
-            whole(high - low, EQUAL_MM),
-            -whole(contact(mesh, up, low), 1.0),
-            k as i64,
-        ];
-        if best.as_ref().is_none_or(|(b, _)| key < *b) {
-            best = Some((key, *up));
-        }
-    }
-    let (_, up) = best?;
+        whole(high - low, EQUAL_MM)
+    });
+    let left = least(left, |up| -whole(contact(mesh, up, extent(mesh, up).0), 1.0));
+    let up = *left.first()?;
     let mut rotation = upright(&up);
     let size = |r: &Matrix3<f64>| {
         let along = |row: usize| extent(mesh, &r.row(row).transpose());
@@ -135,6 +131,19 @@ pub fn lie(mesh: &Mesh, flexures: &[&FlexureSolid], bed_mm: Option<[f64; 3]>) ->
         contact_mm2: contact(mesh, &up, extent(mesh, &up).0),
         flexures: flexures.iter().map(|f| posture(f, &up)).collect(),
     })
+}
+
+/// Those of some directions of which a measure is least, in their order; nothing is measured of one alone.
+fn least<K: Ord + Send>(
+    of: Vec<Vector3<f64>>,
+    measure: impl Fn(&Vector3<f64>) -> K + Sync + Send,
+) -> Vec<Vector3<f64>> {
+    if of.len() < 2 {
+        return of;
+    }
+    let measured: Vec<K> = of.par_iter().map(measure).collect();
+    let best = measured.iter().min();
+    of.into_iter().zip(&measured).filter(|(_, key)| Some(*key) == best).map(|(v, _)| v).collect()
 }
 
 /// Directions to try: as drawn first, then the other axes, then what flexures ask for.

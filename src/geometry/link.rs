@@ -135,9 +135,24 @@ impl BodyPlan {
     pub fn meshes(&self, facets: &Facets) -> Vec<Mesh> {
         let mesh = |(i, (role, slot)): (usize, &(Role, Slot))| match role {
             Role::Plate(_) => self.prism(i).map_or_else(Mesh::default, |p| p.mesh(facets)),
+            Role::Bar | Role::Stub(_) => {
+                slot.mesh_with_hidden_ends(facets, spread(i), self.hidden_ends(slot))
+            }
             _ => slot.mesh(facets, spread(i)),
         };
         self.slots.iter().enumerate().map(mesh).chain(self.solids.iter().map(PlacedSolid::mesh)).collect()
+    }
+
+    /// Which ends of a bar or stub lie wholly inside of what it leads to.
+    fn hidden_ends(&self, bar: &Slot) -> [bool; 2] {
+        let holds = |end: &Vector3<f64>| {
+            let others = self
+                .slots
+                .iter()
+                .filter(|(role, _)| !matches!(role, Role::Bar | Role::Stub(_) | Role::Plate(_)));
+            others.map(|(_, s)| s).any(|s| s.holds_end(bar, end))
+        };
+        [&bar.start, &bar.end].map(holds)
     }
 
     /// One closed mesh a bore, and one a pocket. The facets of a bore touch the stated circle from outside, so that a pin of

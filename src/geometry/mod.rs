@@ -13,6 +13,7 @@
 //! | `fillet` | fillets where flexures enter their stubs |
 //! | `tidy` | removal of tiny edges before rounding to `f32` |
 //! | `union` | the boolean kernel's only client |
+//! | `touch`, `graft` | what touches, and so has to be united; flexures put onto their links |
 //! | `mesh`, `check`, `exact`, `ray` | triangle meshes, their facts by exact arithmetic, measurements on them |
 //! | `solid`, `filled` | meshes from files as parts of links: distances, what is inside, what is wrong with them |
 //! | `weigh` | what links weigh, before anything is meshed |
@@ -32,6 +33,7 @@ mod filled;
 pub mod fillet;
 pub mod fitted;
 pub mod gap;
+mod graft;
 mod guide;
 mod hole;
 pub mod input;
@@ -53,6 +55,7 @@ pub mod solid;
 mod space;
 pub mod sweep;
 pub mod tidy;
+mod touch;
 pub mod union;
 mod wall;
 pub mod weigh;
@@ -73,7 +76,7 @@ pub use lie::{Lying, Posture, lie};
 pub use mesh::Mesh;
 pub use parts::{
     BodySolid, Bore, Eye, FlexureSolid, GeometryError, Guide, Part, Parts, PartsInput, build_carved_parts,
-    build_parts, build_wanted_parts, plan_bodies,
+    build_parts, build_planned, plan_bodies,
 };
 pub use ray::Probe;
 pub use section::{Band, bands, section};

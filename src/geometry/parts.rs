@@ -10,6 +10,7 @@ use super::cycle::MovedState;
 use super::fillet::Fillet;
 use super::fitted::{FitFault, FitFaultKind, MountSolid, PlateSolid, SeatSolid, out_of_reach};
 use super::gap::{Fusion, fusions};
+use super::graft::united;
 use super::link::{BodyPlan, plan_body};
 use super::mesh::Mesh;
 use super::slot::Facets;
@@ -250,24 +251,17 @@ pub fn build_parts(input: &PartsInput) -> Result<Parts, GeometryError> {
 /// # Errors
 /// As [`build_parts`].
 pub fn build_carved_parts(input: &PartsInput, states: &[MovedState]) -> Result<Parts, GeometryError> {
-    build_wanted_parts(input, states, &|_| true)
+    let plans = plan_bodies(input)?;
+    let carving = carve(input, &plans, states)?;
+    build_planned(input, plans, carving, &|_| true)
 }
 
-/// The same, meshed only where wanted, by the bodies of a part; the mesh of any other is empty.
+/// The same from bodies that have been planned and carved, meshed only where wanted, by the bodies of a part; the mesh of any
+/// other is empty.
 ///
 /// # Errors
 /// As [`build_parts`].
-pub fn build_wanted_parts(
-    input: &PartsInput,
-    states: &[MovedState],
-    wanted: &(dyn Fn(&[usize]) -> bool + Sync),
-) -> Result<Parts, GeometryError> {
-    let plans = plan_bodies(input)?;
-    let carving = carve(input, &plans, states)?;
-    build_planned(input, plans, carving, wanted)
-}
-
-fn build_planned(
+pub fn build_planned(
     input: &PartsInput,
     plans: Vec<BodyPlan>,
     carving: Carving,
@@ -328,7 +322,7 @@ pub(super) fn build_part(
 ) -> Result<Part, GeometryError> {
     let name = bodies.first().map(|i| input.bodies[*i].name.clone()).unwrap_or_default();
     let failed = |error| GeometryError::Boolean { name: name.clone(), error };
-    let mut solids: Vec<Mesh> = bodies
+    let solids: Vec<Mesh> = bodies
         .par_iter()
         .map(|i| {
             if let Some(link) = carving.links.get(i) {
@@ -343,8 +337,9 @@ pub(super) fn build_part(
     let inside = |f: &&FlexureSolid| bodies.contains(&f.bodies.0);
     let links = bodies.par_iter().zip(&solids).map(|(b, link)| with_fillets(input, *b, link));
     let links = links.collect::<Result<_, BooleanError>>().map_err(failed)?;
-    solids.extend(input.flexures.iter().filter(inside).map(|f| f.mesh(input.facets.around)));
-    let united = union_all(&solids).map_err(failed)?;
+    let flexures: Vec<Mesh> =
+        input.flexures.iter().filter(inside).map(|f| f.mesh(input.facets.around)).collect();
+    let united = united(&solids, &flexures).map_err(failed)?;
     let mesh = finished(&united);
     let notes = bodies.iter().flat_map(|i| plans[*i].notes.iter().cloned()).collect();
     Ok(Part { name, bodies: bodies.to_vec(), mesh, links, notes })

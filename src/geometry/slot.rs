@@ -28,6 +28,13 @@ impl Default for Facets {
     }
 }
 
+/// Sine of the angle up to which axes are the same.
+const SAME_AXIS: f64 = 1e-9;
+/// A round end lies this far inside of what hides it: facets of that reach less far than the true shape.
+const HIDDEN_MM: f64 = 0.02;
+/// Facets of a round end that nobody sees.
+const HIDDEN_FACETS: usize = 4;
+
 /// Minkowski sum of the segment from `start` to `end`, a disc of `disc_radius_mm` and
 /// ± `half_height_mm` about `axis`, and a ball of `round_mm`. All in mm, in the rest pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,9 +150,28 @@ impl Slot {
         walls + edges
     }
 
+    /// Whether an upright slot without length, `self`, holds the round end of another one that is upright too.
+    pub(super) fn holds_end(&self, other: &Slot, end: &Vector3<f64>) -> bool {
+        let off = end - self.start;
+        let up = off.dot(&self.axis);
+        let aside = (off - self.axis * up).norm();
+        let (height, heights) = (other.half_height_mm + other.round_mm, self.half_height_mm + self.round_mm);
+        self.start == self.end
+            && self.axis.cross(&other.axis).norm() < SAME_AXIS
+            // What is rounded less reaches farther into its corners.
+            && self.round_mm <= other.round_mm
+            && aside + other.radius_mm() + HIDDEN_MM < self.radius_mm()
+            && up.abs() + height + HIDDEN_MM < heights
+    }
+
     /// Closed mesh, vertices on the true surface. `phase` turns the facets of a slot without length
     /// (as a fraction of one facet), so that discs on one axis share no vertex.
     pub fn mesh(&self, facets: &Facets, phase: f64) -> Mesh {
+        self.mesh_with_hidden_ends(facets, phase, [false; 2])
+    }
+
+    /// The same with few facets round those ends that something else holds in itself.
+    pub(super) fn mesh_with_hidden_ends(&self, facets: &Facets, phase: f64, hidden: [bool; 2]) -> Mesh {
         let length = (self.end - self.start).norm();
         let forward = if length > 1e-9 { (self.end - self.start) / length } else { any_normal(&self.axis) };
         // A capsule may lie along any direction; its facets need an axis normal to it.
@@ -156,10 +182,13 @@ impl Slot {
 
         // Outline: (index of the anchor on the segment, angle of the outward direction).
         let turn = if pieces == 0 { phase * TAU / (2 * half) as f64 } else { 0.0 };
-        let arc = |anchor: usize, from: f64, k: usize| (anchor, from + PI * k as f64 / half as f64);
-        let mut outline: Vec<(usize, f64)> = (0..=half).map(|k| arc(pieces, -FRAC_PI_2, k)).collect();
+        let arc = |anchor: usize, from: f64, end: usize| {
+            let half = if hidden[end] { HIDDEN_FACETS.min(half) } else { half };
+            (0..=half).map(move |k| (anchor, from + PI * k as f64 / half as f64))
+        };
+        let mut outline: Vec<(usize, f64)> = arc(pieces, -FRAC_PI_2, 1).collect();
         outline.extend((1..pieces).rev().map(|i| (i, FRAC_PI_2)));
-        outline.extend((0..=half).map(|k| arc(0, FRAC_PI_2, k)));
+        outline.extend(arc(0, FRAC_PI_2, 0));
         outline.extend((1..pieces).map(|i| (i, -FRAC_PI_2)));
         if pieces == 0 {
             outline = (0..2 * half).map(|k| (0, turn + PI * k as f64 / half as f64)).collect();

@@ -7,7 +7,7 @@ use super::link::{BodyPlan, Role};
 use super::skeleton::connect;
 use super::tidy::{SHORT_EDGE_MM, finished, without_short_edges};
 use super::union::{BooleanError, subtract_all, union_all};
-use super::wall::{Wall, least_wall};
+use super::wall::{Left, Wall};
 use super::{Facets, Mesh, Probe, Slot};
 use nalgebra::Vector3;
 use std::f64::consts::PI;
@@ -329,7 +329,7 @@ fn the_least_wall_of_a_notched_bar() {
         slots: vec![(Role::Bar, bar), (Role::Boss, boss(0.0)), (Role::Boss, boss(40.0))],
         ..BodyPlan::default()
     };
-    let whole = least_wall(&plan, &[]);
+    let whole = Left::new(&plan).least_wall();
     assert!(matches!(whole, Wall::Least(w) if (w - 8.0).abs() < 0.4), "{whole:?}");
     for left in [4.0, 1.6, 1.0] {
         let mut notch = Field::new(&v(10.0, -8.0, -8.0), &v(30.0, 8.0, 12.0), 0.6, 1.0);
@@ -340,7 +340,7 @@ fn the_least_wall_of_a_notched_bar() {
             let lift = v(0.0, 0.0, up as f64);
             notch.add(&Slot::capsule(start + lift, end + lift, 1.5), 0.0, 1.2);
         }
-        let wall = least_wall(&plan, &[(0, &notch)]);
+        let wall = Left::new(&plan).without(0, &notch).least_wall();
         // Beyond 2 mm, where the notch's own field ends, it is only known to be as thick.
         let right = |w: f64| (w - left.min(2.2)).abs() < 0.3;
         assert!(matches!(wall, Wall::Least(w) if right(w)), "{left}: {wall:?}");
@@ -349,7 +349,7 @@ fn the_least_wall_of_a_notched_bar() {
         let far = v(-150.0, 300.0, 250.0);
         large.slots.push((Role::Bar, Slot::capsule(v(0.0, 0.0, 0.0), far, 4.0)));
         large.slots.push((Role::Boss, Slot::capsule(far, far, 4.5)));
-        let wall = least_wall(&large, &[(0, &notch)]);
+        let wall = Left::new(&large).without(0, &notch).least_wall();
         assert!(matches!(wall, Wall::Least(w) if right(w)), "{left}: {wall:?} in a large body");
     }
     let mut through = Field::new(&v(10.0, -8.0, -8.0), &v(30.0, 8.0, 8.0), 0.6, 1.0);
@@ -357,7 +357,7 @@ fn the_least_wall_of_a_notched_bar() {
         let lift = f64::from(up);
         through.add(&Slot::capsule(v(20.0, -7.0, lift), v(20.0, 7.0, lift), 1.0), 0.0, 1.2);
     }
-    assert_eq!(least_wall(&plan, &[(0, &through)]), Wall::Apart);
+    assert_eq!(Left::new(&plan).without(0, &through).least_wall(), Wall::Apart);
 }
 
 /// A box at 200 mm, turned, one edge of which has a vertex on one side of it only, so near to a corner and to the edge that the triangle between them

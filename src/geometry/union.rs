@@ -4,6 +4,7 @@
 //! faces out. A panic inside it becomes an error here, because its code cannot be vouched for.
 
 use super::mesh::Mesh;
+use super::touch::{layers, neighbours};
 use boolmesh::prelude::{Manifold, OpType, compute_boolean};
 use nalgebra::Vector3;
 use std::fmt;
@@ -38,28 +39,48 @@ impl std::error::Error for BooleanError {}
 /// agreed; above 1e-11 flat faces no longer count as flat and fill with slivers.
 const SHAKE_MM: f64 = 1e-12;
 
-/// Union of all meshes, pairwise as a balanced tree: the same tree on any number of threads.
+/// Union of all meshes. Those that do not touch each other are one mesh as they stand; the layers of such are united
+/// pairwise as a balanced tree: the same tree on any number of threads.
 ///
 /// # Errors
 /// No mesh, an operand that is not closed, or a failure of the kernel.
 pub fn union_all(meshes: &[Mesh]) -> Result<Mesh, BooleanError> {
-    let shaken: Vec<Mesh> = meshes
-        .iter()
-        .enumerate()
-        .filter(|(_, m)| !m.triangles.is_empty())
-        .map(|(i, m)| m.clone().shaken(SHAKE_MM, i as u64))
-        .collect();
-    union_tree(&shaken)
+    let solids = meshes.iter().enumerate().filter(|(_, m)| !m.triangles.is_empty());
+    let shaken: Vec<Mesh> = solids.map(|(i, m)| shaken(m, i as u64)).collect();
+    let all: Vec<usize> = (0..shaken.len()).collect();
+    union_layers(&shaken, &all, &neighbours(&shaken))
 }
 
-/// `solid` without `tools`, one after the other.
+/// A mesh in general position; each has a seed of its own.
+pub(super) fn shaken(mesh: &Mesh, seed: u64) -> Mesh {
+    mesh.clone().shaken(SHAKE_MM, seed)
+}
+
+/// Union of some of many meshes, which have been shaken, with those that each of them touches.
+pub(super) fn union_layers(
+    shaken: &[Mesh],
+    members: &[usize],
+    neighbours: &[Vec<usize>],
+) -> Result<Mesh, BooleanError> {
+    union_tree(&layers(members, neighbours).iter().map(|l| together(shaken, l)).collect::<Vec<_>>())
+}
+
+fn together(meshes: &[Mesh], layer: &[usize]) -> Mesh {
+    let mut out = Mesh::default();
+    layer.iter().for_each(|i| out.append(&meshes[*i]));
+    out
+}
+
+/// `solid` without `tools`, those that do not touch each other at once.
 ///
 /// # Errors
 /// An operand that is not closed, or a failure of the kernel.
 pub fn subtract_all(solid: &Mesh, tools: &[Mesh]) -> Result<Mesh, BooleanError> {
+    let shaken: Vec<Mesh> = tools.iter().enumerate().map(|(i, t)| shaken(t, 1000 + i as u64)).collect();
+    let all: Vec<usize> = (0..shaken.len()).collect();
     let mut left = solid.clone();
-    for (i, tool) in tools.iter().enumerate() {
-        left = boolean(&left, &tool.clone().shaken(SHAKE_MM, 1000 + i as u64), OpType::Subtract)?;
+    for layer in layers(&all, &neighbours(&shaken)) {
+        left = boolean(&left, &together(&shaken, &layer), OpType::Subtract)?;
     }
     Ok(left)
 }

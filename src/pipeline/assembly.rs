@@ -126,6 +126,8 @@ fn placed_simulation(
         worst: placed_worst(instance, &simulation.worst),
         sway_mm: simulation.sway_mm.clone(),
         load_factors: series(&simulation.load_factors),
+        // Those are in the coordinates of the design.
+        planned: None,
         conventional: None,
         aims,
         // What a motor in common would do released is not known from one half.

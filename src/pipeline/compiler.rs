@@ -11,7 +11,7 @@ use super::report::{Place, Worst};
 use super::scene::{Moving, scene};
 use super::solids;
 use super::stability;
-use super::stages::{Between, Checked, Failed, Parts, Response, Simulation, Solved, Stages};
+use super::stages::{Between, Checked, Failed, Parts, Plans, Response, Simulation, Solved, Stages};
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::elaborate::{Files, Options, elaborate};
 use crate::emit::csv::{MotionState, MotionTable};
@@ -28,6 +28,7 @@ use crate::kinematics::{Motion, solve_motion};
 use crate::math::{Pose, log_so3};
 use crate::optimize::{self, Ending, Method, Problem};
 use nalgebra::Vector3;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Edges of a rod while solving. At 20 edges the moments of the reference cases are within 0.3 %.
@@ -102,11 +103,14 @@ impl Stages for Compiler {
         let cycle = sweep(&model).map_err(|e| lost(design, &e))?;
         let mut simulation = swept(design, &layout, &model, &cycle, &motion);
         let stability = stability::released(design, &layout, &model, &cycle, &mut simulation.diagnostics);
-        let (gaps, carving) = solids::gaps(design, &layout, &model, &cycle);
-        simulation.diagnostics.extend(solids::not_carved(design, &carving));
-        simulation.diagnostics.extend(solids::collisions(design, &gaps));
-        simulation.gaps_mm = gaps.least.iter().filter_map(|g| g.map(|g| g.gap_mm)).collect();
-        simulation.worst.gap = solids::nearest(design, &gaps);
+        if let Some(planned) = solids::planned(design, &layout, &model, &cycle) {
+            let gaps = solids::gaps(&planned);
+            simulation.diagnostics.extend(solids::not_carved(design, &planned.carving));
+            simulation.diagnostics.extend(solids::collisions(design, &gaps));
+            simulation.gaps_mm = gaps.least.iter().filter_map(|g| g.map(|g| g.gap_mm)).collect();
+            simulation.worst.gap = solids::nearest(design, &gaps);
+            simulation.planned = Some(Arc::new(planned));
+        }
         simulation.stability = stability;
         self.loaded(design, values, simulation)
     }
@@ -153,19 +157,12 @@ impl Stages for Compiler {
         })
     }
 
-    fn between(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Between {
+    fn between(&self, assembly: &Assembly, simulations: &[Simulation]) -> Between {
         if assembly.instances.len() < 2 {
             return Between::default();
         }
-        let planned = |(design, values): (&Design, &Vec<f64>)| {
-            let design = &*gravity::weighed(design, values);
-            let (layout, _) = layout(design, values).ok()?;
-            let model = Model::new(design, &layout, values, EDGES, false).ok()?;
-            let cycle = sweep(&model).ok()?;
-            solids::planned(design, &layout, &model, &cycle)
-        };
         // What fails here has failed, and is told, where the designs were simulated.
-        let designs: Option<Vec<_>> = assembly.designs.iter().zip(values).map(planned).collect();
+        let designs: Option<Vec<_>> = simulations.iter().map(|s| s.planned.as_deref()).collect();
         designs.map(|d| joined::between(assembly, &d)).unwrap_or_default()
     }
 
@@ -181,7 +178,7 @@ impl Stages for Compiler {
         })
     }
 
-    fn parts(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Result<Parts, Failed> {
+    fn parts(&self, assembly: &Assembly, values: &[Vec<f64>], plans: &Plans) -> Result<Parts, Failed> {
         let mut found = Vec::new();
         let (mut built, mut moving) = (Vec::new(), Vec::new());
         for (d, (design, values)) in assembly.designs.iter().zip(values).enumerate() {
@@ -190,18 +187,22 @@ impl Stages for Compiler {
             let (layout, _) = layout(design, values)?;
             let model =
                 Model::new(design, &layout, values, MESH_EDGES, false).map_err(|e| no_rod(design, &e))?;
-            // What flexures sweep over the cycle is taken out of their own links.
             let solved = Model::new(design, &layout, values, EDGES, false).map_err(|e| no_rod(design, &e))?;
             let cycle = sweep(&solved).map_err(|e| lost(design, &e))?;
-            let states = solids::states(design, &layout, &solved, &cycle);
-            let (parts, findings) = solids::build(design, &layout, &model, &states, &|bodies| {
-                joined::stands_alone(assembly, d, bodies)
-            })?;
+            // What flexures sweep over the cycle is taken out of their own links.
+            let known = plans.designs.get(d).cloned().flatten();
+            let planned = match known {
+                Some(planned) => planned,
+                None => Arc::new(solids::plan(design, &layout, &solved, &cycle)?),
+            };
+            let input = parts_input(design, &layout, &model);
+            let (parts, findings) =
+                solids::build(design, &input, &planned, &|bodies| joined::stands_alone(assembly, d, bodies))?;
             found.extend(findings);
             moving.push(Moving::new(design, &layout, &solved, &cycle));
-            built.push(Solid { input: parts_input(design, &layout, &model), parts, states });
+            built.push(Solid { input, parts, states: planned.states.clone() });
         }
-        let (parts, findings) = joined::parts(assembly, &built)?;
+        let (parts, findings) = joined::parts(assembly, &built, plans.whole.as_deref())?;
         found.extend(findings);
         let whole = Built { assembly, solids: &built, moving: &moving, printed: &parts };
         let made = products::artefacts(&whole);

@@ -2,7 +2,7 @@
 //! many designs and `diff` of two versions of one.
 
 use super::report::{BuildOutcome, Origin};
-use super::stages::{Failed, Simulation, Stages};
+use super::stages::{Failed, Plans, Simulation, Stages};
 use super::{Progress, Request, assembly, check_locked, front_end, keep, solve_all, tell_once, values_of};
 use crate::diagnostic::Diagnostic;
 use crate::elaborate::Files;
@@ -96,7 +96,7 @@ fn run(
     let simulations =
         pairs().map(|(d, v)| stages.simulate(d, v)).collect::<Result<Vec<Simulation>, Failed>>();
     let simulations = keep(simulations, &mut out.diagnostics)?;
-    let between = stages.between(&assembly, &found.values);
+    let between = stages.between(&assembly, &simulations);
     tell_once(simulations.iter().flat_map(|s| s.diagnostics.iter().cloned()), out);
     tell_once(between.diagnostics.iter().cloned(), out);
     let placed = assembly::place(&assembly, &simulations);
@@ -107,7 +107,7 @@ fn run(
         let mut solids = assembly.clone();
         // Without exports each part comes once, whatever is asked for.
         solids.exports.clear();
-        let parts = stages.parts(&solids, &found.values).ok();
+        let parts = stages.parts(&solids, &found.values, &Plans::of(&simulations, &between)).ok();
         found.volume_mm3 = parts.map(|p| p.artefacts.iter().map(|p| volume_mm3(&p.bytes)).sum());
     }
     Some(())

@@ -13,6 +13,7 @@ use crate::geometry::{
 use crate::ir::assembly::Joined;
 use crate::ir::{Assembly, Instance};
 use nalgebra::{Matrix3, Vector3};
+use std::sync::Arc;
 
 /// A design in solids.
 pub struct Solid {
@@ -25,6 +26,7 @@ pub struct Solid {
 }
 
 /// A design as it is planned.
+#[derive(Clone, Debug)]
 pub struct Planned {
     /// What its parts are made of.
     pub input: PartsInput,
@@ -96,11 +98,15 @@ pub fn outlines(assembly: &Assembly, solids: &[Solid]) -> Vec<Printed> {
     out
 }
 
-/// All printed parts, and findings that do not stop the work.
+/// All printed parts, and findings that do not stop the work. `carved` are the links of the whole, if they are known.
 ///
 /// # Errors
 /// Where parts cannot be united.
-pub fn parts(assembly: &Assembly, solids: &[Solid]) -> Result<(Vec<Printed>, Vec<Diagnostic>), Failed> {
+pub fn parts(
+    assembly: &Assembly,
+    solids: &[Solid],
+    carved: Option<&Carving>,
+) -> Result<(Vec<Printed>, Vec<Diagnostic>), Failed> {
     if let (Some(_), [alone]) = (assembly.single(), solids) {
         let print = |part: &Part| Printed {
             name: format!("{}_{}", assembly.name, part.name),
@@ -118,7 +124,7 @@ pub fn parts(assembly: &Assembly, solids: &[Solid]) -> Result<(Vec<Printed>, Vec
         }
     };
     let known: Vec<Known<'_>> = solids.iter().map(Solid::known).collect();
-    let whole = joined(assembly, &known).map_err(failed(&assembly.name, assembly.origin))?;
+    let whole = joined(assembly, &known, carved).map_err(failed(&assembly.name, assembly.origin))?;
     let (mut out, mut found) = (Vec::new(), seats(assembly, &known));
     for group in whole.groups() {
         let Some((name, at)) = name(assembly, solids, &whole, &group) else { continue };
@@ -156,8 +162,12 @@ pub fn parts(assembly: &Assembly, solids: &[Solid]) -> Result<(Vec<Printed>, Vec
 }
 
 /// The instances as one mechanism, from what is known of each design. Bodies of the assembly with points of their own
-/// follow the instances, each as a share that stands still ([`own`]).
-fn joined(assembly: &Assembly, designs: &[Known<'_>]) -> Result<Whole, GeometryError> {
+/// follow the instances, each as a share that stands still ([`own`]). What is `carved` need not be carved again.
+fn joined(
+    assembly: &Assembly,
+    designs: &[Known<'_>],
+    carved: Option<&Carving>,
+) -> Result<Whole, GeometryError> {
     let mut known: Vec<(usize, usize)> = Vec::new();
     let mut count = 0;
     let mut shares = Vec::new();
@@ -186,7 +196,7 @@ fn joined(assembly: &Assembly, designs: &[Known<'_>]) -> Result<Whole, GeometryE
         }
     }
     shares.extend(frames.iter().map(|(frame, body)| frame.share(*body, states)));
-    join(&shares)
+    join(&shares, carved)
 }
 
 /// What a joined body has of its own, planned; none: nothing is known of its members.
@@ -441,10 +451,10 @@ fn not_carved(assembly: &Assembly, solids: &[Solid], whole: &Whole) -> Vec<Diagn
 }
 
 /// Gaps between instances over the cycle: what each design says of itself is left out.
-pub fn between(assembly: &Assembly, designs: &[Planned]) -> Between {
-    let all: Vec<Known<'_>> = designs.iter().map(Planned::known).collect();
+pub fn between(assembly: &Assembly, designs: &[&Planned]) -> Between {
+    let all: Vec<Known<'_>> = designs.iter().map(|p| p.known()).collect();
     // Where no solid comes out the mesh stage says why.
-    let Ok(whole) = joined(assembly, &all) else { return Between::default() };
+    let Ok(mut whole) = joined(assembly, &all, None) else { return Between::default() };
     let gaps = whole.gaps();
     let known = |i: usize, a: Member, b: Member| {
         let Some(p) = assembly.instances.get(i).and_then(|n| designs.get(n.design)) else { return false };
@@ -458,10 +468,12 @@ pub fn between(assembly: &Assembly, designs: &[Planned]) -> Between {
         let called = |m: Member| Some(side(assembly, &whole, *whole.owners(m).first()?, m)?.name);
         Some((l.gap_mm, Place { of: vec![called(l.a)?, called(l.b)?], state: l.state }))
     });
+    let diagnostics = gaps.overlaps.iter().filter_map(told).collect();
     Between {
         worst: Worst { gap: nearest, ..Worst::default() },
         gaps_mm: gaps.least.iter().filter_map(|g| g.map(|g| g.gap_mm)).collect(),
-        diagnostics: gaps.overlaps.iter().filter_map(told).collect(),
+        diagnostics,
+        carving: Some(Arc::new(std::mem::take(&mut whole.carving))),
     }
 }
 

@@ -29,6 +29,7 @@ pub use aims::{AimSeries, DirectionMeasures, OutputMeasures};
 pub use compiler::{Compiler, EDGES};
 pub use examine::{Examined, Extent, Values, examine};
 pub use history::History;
+pub use joined::Planned;
 pub use manifest::COMPILER;
 pub use measure::{aggregate, check_requirements, is_closed, measure};
 pub use parameters::{Parameter, of as parameters};
@@ -38,7 +39,9 @@ pub use report::{
     Seconds, StressMeasures, TraceMeasures, Worst,
 };
 pub use stability::{DriveValues, LimitPoint, RestState, SnapThrough, Stability};
-pub use stages::{Between, Checked, Failed, Made, NothingMade, Parts, Response, Simulation, Solved, Stages};
+pub use stages::{
+    Between, Checked, Failed, Made, NothingMade, Parts, Plans, Response, Simulation, Solved, Stages,
+};
 
 use crate::diagnostic::{Diagnostic, Severity};
 pub use crate::elaborate::{FileError, Files, MOST_SOLID_BYTES, SolidFile};
@@ -161,8 +164,7 @@ fn run_build(
     let start = |d: &Design| stages.simulate(d, &starts(d));
     let before: Option<Vec<Simulation>> = assembly.designs.iter().map(|d| start(d).ok()).collect();
     let before = before.map(|b| {
-        let started: Vec<Vec<f64>> = assembly.designs.iter().map(starts).collect();
-        let between = stages.between(&assembly, &started);
+        let between = stages.between(&assembly, &b);
         let placed = assembly::place(&assembly, &b);
         out.before = Some(assembly::measure_all(&assembly, &placed, &between));
         page::Motion { whole: assembly::combine(&assembly, placed.clone(), &between), placed }
@@ -170,7 +172,7 @@ fn run_build(
     let after = assembly.designs.iter().zip(&values);
     let after = after.map(|(d, v)| stages.simulate(d, v)).collect::<Result<Vec<Simulation>, Failed>>();
     let simulations = keep(after, &mut out.diagnostics);
-    let between = simulations.as_ref().map(|_| stages.between(&assembly, &values)).unwrap_or_default();
+    let between = simulations.as_ref().map(|s| stages.between(&assembly, s)).unwrap_or_default();
     clock.stop(&mut out.seconds.solve);
     let simulations = simulations?;
     tell_once(simulations.iter().flat_map(|s| s.diagnostics.iter().cloned()), out);
@@ -184,7 +186,8 @@ fn run_build(
     let clock = Clock::start(progress, Stage::Mesh);
     let mut shown = None;
     if assembly.exports.iter().any(|e| e.export.kind.of_solids()) {
-        match keep(stages.parts(&assembly, &values), &mut out.diagnostics) {
+        let plans = Plans::of(&simulations, &between);
+        match keep(stages.parts(&assembly, &values, &plans), &mut out.diagnostics) {
             Some(parts) => {
                 out.artefacts.extend(parts.artefacts);
                 shown = parts.shown;
@@ -263,7 +266,7 @@ pub fn simulate(
             let rigid = assembly.designs.iter().map(|d| stages.rigid(d, &starts(d)));
             keep(rigid.collect::<Result<Vec<_>, Failed>>(), &mut out.diagnostics)?
         } else {
-            let (mut found, mut solved) = (Vec::new(), Vec::new());
+            let mut found = Vec::new();
             for (design, lock) in assembly.designs.iter().zip(read_locks(request, &assembly, &mut out).ok()?)
             {
                 let solution = match lock {
@@ -278,12 +281,11 @@ pub fn simulate(
                 let shown =
                     if show.rigid { stages.rigid(design, &values) } else { stages.simulate(design, &values) };
                 found.push(keep(shown, &mut out.diagnostics)?);
-                solved.push(values);
             }
             // The conventional motion's findings have been told by the check.
             if !show.rigid {
                 tell_once(found.iter().flat_map(|s| s.diagnostics.iter().cloned()), &mut out);
-                between = stages.between(&assembly, &solved);
+                between = stages.between(&assembly, &found);
                 tell_once(between.diagnostics.iter().cloned(), &mut out);
             }
             found

@@ -16,9 +16,9 @@ use crate::emit::sheet::print_sheet;
 use crate::emit::stl::stl_bytes;
 use crate::emit::threemf::threemf_bytes;
 use crate::geometry::{Band, bands};
+use crate::ir::assembly::AssemblyExport;
 use crate::ir::{Assembly, ExportKind};
 use rayon::prelude::*;
-use std::cell::OnceCell;
 
 /// Pixels of a picture, and of the thumbnail in an archive of parts.
 const PICTURE: (u32, u32) = (960, 720);
@@ -42,27 +42,37 @@ type Written = Result<Artefact, (&'static str, &'static str, String)>;
 /// Every export of parts that is asked for, in the order of the text, each kind once; and what is to say of them.
 pub fn artefacts(built: &Built<'_>) -> Parts {
     let Built { assembly, solids, moving, printed } = *built;
-    let (shown, laid, cut) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
-    let scene = || shown.get_or_init(|| scene(assembly, moving, solids, printed));
-    let plate = || laid.get_or_init(|| lay::plate(assembly, moving, printed));
-    let sections =
-        || cut.get_or_init(|| plate().parts.par_iter().map(|p| bands(&p.mesh)).collect::<Vec<_>>());
+    let asked = |what: fn(&ExportKind) -> bool| assembly.exports.iter().any(|e| what(&e.export.kind));
+    // What several files show is made before, not when first asked for: they are written on all threads.
+    let shown = asked(ExportKind::of_solids).then(|| {
+        rayon::join(|| scene(assembly, moving, solids, printed), || lay::plate(assembly, moving, printed))
+    });
+    let parts = shown.iter().flat_map(|(_, plate)| &plate.parts).collect::<Vec<_>>();
+    let sections: Vec<Vec<Band>> = match asked(|kind| *kind == ExportKind::Dxf) {
+        true => parts.par_iter().map(|p| bands(&p.mesh)).collect(),
+        false => Vec::new(),
+    };
+    let first = |(k, placed): &(usize, &AssemblyExport)| {
+        !assembly.exports.iter().take(*k).any(|e| e.export.kind == placed.export.kind)
+    };
+    let exports: Vec<_> = assembly.exports.iter().enumerate().filter(first).map(|(_, e)| &e.export).collect();
     let (mut out, mut found) = (Vec::new(), Vec::new());
-    for (k, placed) in assembly.exports.iter().enumerate() {
-        let kind = &placed.export.kind;
-        if assembly.exports.iter().take(k).any(|e| e.export.kind == *kind) {
-            continue;
-        }
-        for written in files(&assembly.name, kind, printed, &scene, &plate, &sections) {
-            match written {
-                Ok(artefact) => out.push(artefact),
-                Err((code, what, why)) => {
-                    let message = format!("no {what} can be written: {why}");
-                    found.push(
-                        Diagnostic::error(code, message, placed.export.origin)
-                            .help("build without this export, and report what was said"),
-                    );
-                }
+    let write = |(scene, plate): &(Scene, Plate)| -> Vec<Vec<Written>> {
+        let known = Known { name: &assembly.name, printed, scene, plate, sections: &sections };
+        exports.par_iter().map(|e| files(&e.kind, &known)).collect()
+    };
+    let files = shown.as_ref().map(write).unwrap_or_default();
+    for (export, written) in
+        exports.iter().zip(files).flat_map(|(e, all)| all.into_iter().map(move |w| (e, w)))
+    {
+        match written {
+            Ok(artefact) => out.push(artefact),
+            Err((code, what, why)) => {
+                let message = format!("no {what} can be written: {why}");
+                found.push(
+                    Diagnostic::error(code, message, export.origin)
+                        .help("build without this export, and report what was said"),
+                );
             }
         }
     }
@@ -76,58 +86,68 @@ pub fn artefacts(built: &Built<'_>) -> Parts {
             }
         }
     }
-    // The report is written when all else is known.
-    let reported = assembly.exports.iter().any(|e| e.export.kind == ExportKind::Report);
-    let shown = reported.then(|| (scene().clone(), plate().clone()));
-    if let Some(plate) = laid.get() {
+    if let Some((_, plate)) = shown.as_ref().filter(|_| asked(shows_plate)) {
         found.extend(lay::findings(assembly, plate, printed));
         if let Some(drawn) = assembly.exports.iter().find(|e| e.export.kind == ExportKind::Dxf) {
-            found.extend(lay::uneven(plate, sections(), drawn.export.origin));
+            found.extend(lay::uneven(plate, &sections, drawn.export.origin));
         }
     }
-    Parts { artefacts: out, diagnostics: found, shown }
+    // The report is written when all else is known.
+    let reported = asked(|kind| *kind == ExportKind::Report);
+    Parts { artefacts: out, diagnostics: found, shown: shown.filter(|_| reported) }
 }
 
-fn files<'s>(
-    name: &str,
-    kind: &ExportKind,
-    printed: &[Printed],
-    scene: &dyn Fn() -> &'s Scene,
-    plate: &dyn Fn() -> &'s Plate,
-    sections: &dyn Fn() -> &'s Vec<Vec<Band>>,
-) -> Vec<Written> {
+/// Whether a file shows parts on the bed.
+fn shows_plate(kind: &ExportKind) -> bool {
+    matches!(
+        kind,
+        ExportKind::Stl | ExportKind::ThreeMf | ExportKind::Sheet | ExportKind::Dxf | ExportKind::Report
+    )
+}
+
+/// What files are written of.
+struct Known<'k> {
+    name: &'k str,
+    printed: &'k [Printed],
+    scene: &'k Scene,
+    plate: &'k Plate,
+    sections: &'k [Vec<Band>],
+}
+
+fn files(kind: &ExportKind, known: &Known<'_>) -> Vec<Written> {
+    let Known { name, printed, scene, plate, sections } = *known;
     let file = |name: String, bytes: Result<Vec<u8>, String>, code: &'static str, what: &'static str| {
         bytes.map(|bytes| Artefact { name, bytes }).map_err(|why| (code, what, why))
     };
     let stl =
         |name: &str, mesh| file(name.to_string(), stl_bytes(mesh).map_err(|e| e.to_string()), "E0631", "STL");
-    let picture = |(width, height)| png_bytes(scene(), width, height);
+    let picture = |(width, height)| png_bytes(scene, width, height);
     match kind {
-        ExportKind::Stl => plate().parts.iter().map(|p| stl(&format!("{}.stl", p.name), &p.mesh)).collect(),
+        ExportKind::Stl => plate.parts.iter().map(|p| stl(&format!("{}.stl", p.name), &p.mesh)).collect(),
         ExportKind::StlAssembled => {
             printed.iter().map(|p| stl(&format!("assembled/{}.stl", p.name), &p.mesh)).collect()
         }
         ExportKind::Glb => {
-            let bytes = glb_bytes(scene()).map_err(|e| e.to_string());
+            let bytes = glb_bytes(scene).map_err(|e| e.to_string());
             vec![file(format!("{name}.glb"), bytes, "E0643", "glTF")]
         }
         ExportKind::ThreeMf => {
-            let bytes = picture(THUMBNAIL).and_then(|thumbnail| threemf_bytes(plate(), &thumbnail));
+            let bytes = picture(THUMBNAIL).and_then(|thumbnail| threemf_bytes(plate, &thumbnail));
             vec![file(format!("{name}.3mf"), bytes, "E0646", "3MF")]
         }
         ExportKind::Sheet => {
-            let bytes = Ok(print_sheet(plate()).into_bytes());
+            let bytes = Ok(print_sheet(plate).into_bytes());
             vec![file(format!("{name}.print.md"), bytes, "E0646", "print sheet")]
         }
         ExportKind::Dxf => {
             let drawn = |(p, bands): (&Laid, &Vec<Band>)| {
                 file(format!("{}.dxf", p.name), dxf_bytes(bands), "E0647", "DXF")
             };
-            plate().parts.iter().zip(sections()).map(drawn).collect()
+            plate.parts.iter().zip(sections).map(drawn).collect()
         }
         ExportKind::Png => vec![file(format!("{name}.png"), picture(PICTURE), "E0647", "picture")],
         ExportKind::Svg => {
-            let bytes = Ok(svg_drawing(scene()).into_bytes());
+            let bytes = Ok(svg_drawing(scene).into_bytes());
             vec![file(format!("{name}.svg"), bytes, "E0647", "drawing")]
         }
         ExportKind::Report | ExportKind::Arduino(_) | ExportKind::Code(..) => Vec::new(),

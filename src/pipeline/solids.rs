@@ -8,24 +8,23 @@ use crate::equilibrium::{Cycle, Layout, Model};
 use crate::geometry::link::plan_body;
 use crate::geometry::{
     Carving, Cut, CycleGaps, FitFault, FitFaultKind, Fusion, GeometryError, LeastGap, Member, MovedState,
-    Parts, build_wanted_parts, carve, carved_cycle_gaps, flexure_solid, parts_input, plan_bodies,
+    Parts, PartsInput, build_planned, carve, carved_cycle_gaps, flexure_solid, parts_input, plan_bodies,
 };
 use crate::ir::{AddedSolid, Assembly, Design, Joint, JointKind, SurfaceFault, SurfaceFaultKind};
 
-/// Builds the printed parts of a design in its rest pose; links make way for their own flexures in the `states` of the
-/// cycle. Meshed is only what is `wanted`, by the bodies of a part.
+/// Builds the printed parts of a design in its rest pose from its finer flexures and what they are `planned` as. Meshed is
+/// only what is `wanted`, by the bodies of a part.
 ///
 /// # Errors
 /// Where no solid comes out.
 pub fn build(
     design: &Design,
-    layout: &Layout,
-    model: &Model,
-    states: &[MovedState],
+    input: &PartsInput,
+    planned: &Planned,
     wanted: &(dyn Fn(&[usize]) -> bool + Sync),
 ) -> Result<(Parts, Vec<Diagnostic>), Failed> {
-    let input = parts_input(design, layout, model);
-    let parts = build_wanted_parts(&input, states, wanted).map_err(|e| no_solid(design, &e))?;
+    let (plans, carving) = (planned.plans.clone(), planned.carving.clone());
+    let parts = build_planned(input, plans, carving, wanted).map_err(|e| no_solid(design, &e))?;
     let mut found: Vec<Diagnostic> = parts.fusions.iter().map(|f| fusion(design, f)).collect();
     let faults = parts.plans.iter().flat_map(|p| &p.faults).chain(&parts.out_of_reach);
     found.extend(faults.map(|f| fit_fault(design, f)));
@@ -161,15 +160,10 @@ pub fn states(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) ->
 }
 
 /// Gaps of the planned solids over the cycle, flexures as polygons of the solver's edges (for 20 edges of 1.6 mm
-/// bent to a radius of 15 mm, 0.02 mm inside the arc), links as they are after making way for their own flexures; empty
-/// where there are no solids to measure (the mesh stage says why): a gap of parts that cannot be made yet would be a
-/// guess.
-pub fn gaps(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> (CycleGaps, Carving) {
-    let Some(Planned { input, plans, carving, states }) = planned(design, layout, model, cycle) else {
-        return Default::default();
-    };
-    let gaps = carved_cycle_gaps(&plans, &states, &carving, input.clearance_mm, |_, _| false);
-    (gaps, carving)
+/// bent to a radius of 15 mm, 0.02 mm inside the arc), links as they are after making way for their own flexures.
+pub fn gaps(planned: &Planned) -> CycleGaps {
+    let Planned { input, plans, carving, states } = planned;
+    carved_cycle_gaps(plans, states, carving, input.clearance_mm, |_, _| false)
 }
 
 /// A design as its bodies are planned, without any solid; a body that cannot be planned has no form.
@@ -186,14 +180,24 @@ pub fn outlined(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) 
     Solid { input, parts, states: states(design, layout, model, cycle) }
 }
 
-/// A design as it is planned; none where there are no solids to measure.
+/// A design as it is planned; none where there are no solids to measure (the mesh stage says why): a gap of parts that
+/// cannot be made yet would be a guess.
 pub fn planned(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> Option<Planned> {
     available(design).ok()?;
+    plan(design, layout, model, cycle).ok()
+}
+
+/// A design as it is planned: links make way for their own flexures in the states of the cycle.
+///
+/// # Errors
+/// Where no solid comes out.
+pub fn plan(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> Result<Planned, Failed> {
     let input = parts_input(design, layout, model);
-    let plans = plan_bodies(&input).ok()?;
+    let failed = |e: GeometryError| no_solid(design, &e);
+    let plans = plan_bodies(&input).map_err(failed)?;
     let states = states(design, layout, model, cycle);
-    let carving = carve(&input, &plans, &states).ok()?;
-    Some(Planned { input, plans, carving, states })
+    let carving = carve(&input, &plans, &states).map_err(failed)?;
+    Ok(Planned { input, plans, carving, states })
 }
 
 /// The nearest two over the whole cycle, with their gap (mm).

@@ -2,6 +2,7 @@
 //! [`Compiler`](super::Compiler) is the real thing; tests put small mechanisms with known answers in its place.
 
 use super::aims::AimSeries;
+use super::joined::Planned;
 use super::progress::Iteration;
 use super::report::{Artefact, Worst};
 use super::stability::Stability;
@@ -10,8 +11,10 @@ use crate::elaborate::{Files, KnownValue, OwnFile};
 use crate::emit::csv::MotionTable;
 use crate::emit::plate::Plate;
 use crate::emit::scene::Scene;
+use crate::geometry::Carving;
 use crate::ir::{Assembly, Design, Solution};
 use crate::kinematics::Motion;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Findings of a stage that gave nothing.
@@ -56,6 +59,8 @@ pub struct Simulation {
     pub sway_mm: Vec<f64>,
     /// Factor by which all loads can grow at every state before it buckles; empty where nothing asks for it.
     pub load_factors: Vec<f64>,
+    /// What its printed parts are planned as, for what comes after; none where there is nothing to print.
+    pub planned: Option<Arc<Planned>>,
     /// Of a conventional motion, the motion.
     pub conventional: Option<Motion>,
     /// The same under each of the design's load cases, without what only solids and released drives show; of a
@@ -72,8 +77,29 @@ pub struct Between {
     pub gaps_mm: Vec<f64>,
     /// The least of them all.
     pub worst: Worst,
+    /// The links of the whole, those in common included, as they make way for flexures; none where instances are not joined.
+    pub carving: Option<Arc<Carving>>,
     /// Where they meet.
     pub diagnostics: Vec<Diagnostic>,
+}
+
+/// What is known of printed parts before they are made: gaps are those of the same links.
+#[derive(Clone, Debug, Default)]
+pub struct Plans {
+    /// Each design; none where it is not known.
+    pub designs: Vec<Option<Arc<Planned>>>,
+    /// The links of the whole.
+    pub whole: Option<Arc<Carving>>,
+}
+
+impl Plans {
+    /// Those of a simulated assembly.
+    pub fn of(simulations: &[Simulation], between: &Between) -> Self {
+        Self {
+            designs: simulations.iter().map(|s| s.planned.clone()).collect(),
+            whole: between.carving.clone(),
+        }
+    }
 }
 
 /// What the optimiser gives.
@@ -178,9 +204,9 @@ pub trait Stages {
         Err(Failed::new())
     }
 
-    /// What the instances of an assembly are to each other; `values` are those of each design. Nothing where there is one
-    /// instance, or no printed form.
-    fn between(&self, _assembly: &Assembly, _values: &[Vec<f64>]) -> Between {
+    /// What the instances of an assembly are to each other; `simulations` are those of each design. Nothing where there is
+    /// one instance, or no printed form.
+    fn between(&self, _assembly: &Assembly, _simulations: &[Simulation]) -> Between {
         Between::default()
     }
 
@@ -197,11 +223,11 @@ pub trait Stages {
     ) -> Result<Solved, Failed>;
 
     /// The files of printed parts that the assembly's exports ask for; where they ask for none, an STL a part in the
-    /// rest pose of the assembly. `values` are those of each design.
+    /// rest pose of the assembly. `values` are those of each design; what `plans` lack is worked out.
     ///
     /// # Errors
     /// Where no closed solid comes out.
-    fn parts(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Result<Parts, Failed>;
+    fn parts(&self, assembly: &Assembly, values: &[Vec<f64>], plans: &Plans) -> Result<Parts, Failed>;
 
     /// The mechanism in motion without uniting anything: links as the primitives that they are planned of, flexures as
     /// they bend, and an empty bed. It takes a sweep, where [`Self::parts`] takes solids.
@@ -218,6 +244,6 @@ pub trait Stages {
     /// Where no closed solid comes out.
     fn mesh(&self, design: &Design, values: &[f64]) -> Result<(Vec<Artefact>, Vec<Diagnostic>), Failed> {
         let assembly = Assembly { exports: Vec::new(), ..Assembly::of(design.clone()) };
-        self.parts(&assembly, &[values.to_vec()]).map(|p| (p.artefacts, p.diagnostics))
+        self.parts(&assembly, &[values.to_vec()], &Plans::default()).map(|p| (p.artefacts, p.diagnostics))
     }
 }

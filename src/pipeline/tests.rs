@@ -162,7 +162,7 @@ impl Stages for Toy {
         Ok(Solved { solution, interrupted, diagnostics: Vec::new() })
     }
 
-    fn parts(&self, _: &Assembly, values: &[Vec<f64>]) -> Result<Parts, Failed> {
+    fn parts(&self, _: &Assembly, values: &[Vec<f64>], _: &Plans) -> Result<Parts, Failed> {
         let part = Artefact { name: "toy.stl".into(), bytes: values[0][0].to_le_bytes().to_vec() };
         Ok(Parts { artefacts: vec![part], ..Parts::default() })
     }

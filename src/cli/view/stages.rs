@@ -7,7 +7,7 @@ use flexura::ir::assembly::AssemblyExport;
 use flexura::ir::{Assembly, Design, Export, ExportKind};
 use flexura::kinematics::Motion;
 use flexura::pipeline::{
-    Between, Checked, Compiler, Failed, Files, Iteration, Parts, Response, Simulation, Solved, Stages,
+    Between, Checked, Compiler, Failed, Files, Iteration, Parts, Plans, Response, Simulation, Solved, Stages,
 };
 use std::sync::atomic::AtomicBool;
 
@@ -66,8 +66,8 @@ impl Stages for Shown {
         self.compiler.respond(design, values, drives)
     }
 
-    fn between(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Between {
-        if self.whole { self.compiler.between(assembly, values) } else { Between::default() }
+    fn between(&self, assembly: &Assembly, simulations: &[Simulation]) -> Between {
+        if self.whole { self.compiler.between(assembly, simulations) } else { Between::default() }
     }
 
     fn optimize(
@@ -80,9 +80,9 @@ impl Stages for Shown {
         self.compiler.optimize(design, start, on_iteration, cancel)
     }
 
-    fn parts(&self, assembly: &Assembly, values: &[Vec<f64>]) -> Result<Parts, Failed> {
+    fn parts(&self, assembly: &Assembly, values: &[Vec<f64>], plans: &Plans) -> Result<Parts, Failed> {
         if self.whole {
-            return self.compiler.parts(assembly, values);
+            return self.compiler.parts(assembly, values, plans);
         }
         let shown = self.compiler.outline(assembly, values)?;
         Ok(Parts { shown: Some(shown), ..Parts::default() })
