@@ -90,7 +90,9 @@ fn part(text: &str) -> Mesh {
 /// along x; degrees.
 fn inner_corner_deg(mesh: &Mesh, z_mm: f64) -> f64 {
     let mut worst: f64 = 0.0;
-    for outline in section(mesh, z_mm) {
+    for mut outline in section(mesh, z_mm) {
+        // Of pieces that the lattice turns nothing is told: what is so near is one point.
+        outline.dedup_by(|p, q| (p[0] - q[0]).hypot(p[1] - q[1]) < 0.02);
         let n = outline.len();
         for i in 0..n {
             let [p, q, r] = [outline[(i + n - 1) % n], outline[i], outline[(i + 1) % n]];
@@ -98,10 +100,6 @@ fn inner_corner_deg(mesh: &Mesh, z_mm: f64) -> f64 {
                 continue;
             }
             let (a, b) = ([q[0] - p[0], q[1] - p[1]], [r[0] - q[0], r[1] - q[1]]);
-            // Of pieces that the lattice turns nothing is told.
-            if a[0].hypot(a[1]) < 0.01 || b[0].hypot(b[1]) < 0.01 {
-                continue;
-            }
             let turn = (a[0] * b[1] - a[1] * b[0]).atan2(a[0] * b[0] + a[1] * b[1]);
             worst = worst.max(-turn.to_degrees());
         }
