@@ -172,7 +172,7 @@ fn what_is_apart_costs_nothing() {
 /// left out: these are carved.
 fn measured(design: &Design, layout: &Layout, p: &[f64]) -> (f64, usize) {
     let (model, cycle) = cycle(design, layout, p);
-    let plans = plan_bodies(&parts_input(design, layout, &model)).unwrap();
+    let plans = plan_bodies(&parts_input(design, layout, &model).unfilleted()).unwrap();
     let states: Vec<MovedState> = cycle
         .states
         .iter()

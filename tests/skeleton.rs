@@ -28,7 +28,7 @@ fn example() -> (Design, Layout) {
 
 fn capsules(design: &Design, layout: &Layout, p: &[f64]) -> Vec<SkeletonCapsule> {
     let model = Model::new(design, layout, p, EDGES, true).unwrap();
-    let plans = plan_bodies(&parts_input(design, layout, &model)).unwrap();
+    let plans = plan_bodies(&parts_input(design, layout, &model).unfilleted()).unwrap();
     for plan in &plans {
         assert_eq!(plan.slots.len(), plan.follows.len());
     }
@@ -121,7 +121,7 @@ fn fans_fill_their_slots() {
     let (design, layout) = example();
     let p: Vec<f64> = design.free.iter().map(|f| f.start).collect();
     let model = Model::new(&design, &layout, &p, EDGES, true).unwrap();
-    let plans = plan_bodies(&parts_input(&design, &layout, &model)).unwrap();
+    let plans = plan_bodies(&parts_input(&design, &layout, &model).unfilleted()).unwrap();
     let axis = Vector3::from(design.layers.axis);
     let all = skeleton_capsules(&design, &plans, &model);
     for (body, plan) in plans.iter().enumerate() {

@@ -72,7 +72,7 @@ impl Fillet {
         };
         // What a fillet all round adds to a leaf of this width is a wire's.
         let roundness = if all_round > 0.0 { roundness } else { 0.0 };
-        let start = extra_length_mm(2.0 * a_mm, radius_mm, roundness, section);
+        let start = extra_length_mm(2.0 * a_mm, radius_mm, roundness);
         Some(Self {
             radius_mm,
             start_mm: start.min(MOST_OF_LENGTH * length_mm),

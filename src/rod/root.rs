@@ -1,34 +1,23 @@
 //! The root of a flexure with a fillet: how much longer it is than one that is clamped where the fillet begins, and how
 //! much its largest stress exceeds the rod's. Both are of the printed form; no rod knows of them.
 
-use super::section::SectionShape;
-
 /// Length by which a root counts beyond the place where its fillet begins: e/t = c₀ + c₁ √(r/t) + c₂ r/t in bending about the wide
 /// direction, of a leaf and of a round wire. Fitted to plane and to axisymmetric finite elements of our own for
 /// 0.06 ≤ r/t ≤ 3.3 (`docs/rod-model.md`), to 0.009 t and 0.005 t; the root of r/t is what a fillet alone gives where it is long.
 const LEAF: [f64; 3] = [0.358, 0.254, 0.108];
 const WIRE: [f64; 3] = [0.177, 0.268, 0.080];
 
-/// An elliptical leaf is strips beside each other with cos θ of its thickness, whose stiffnesses are as the cubes of that: their means of
-/// cos θ and of its root.
-const STRIPS: [f64; 2] = [0.905, 0.949];
-
 /// Beyond the place where its fillet begins a root is as compliant in bending as this length (mm) of the flexure. `thick_mm` is
 /// the full thickness; `roundness` the thickness by the width, 0 of a wide leaf, 1 of a round wire (in between the
-/// square of it is assumed) of a section of this shape. Zero without a fillet.
-pub fn extra_length_mm(thick_mm: f64, radius_mm: f64, roundness: f64, shape: SectionShape) -> f64 {
+/// square of it is assumed). Zero without a fillet.
+pub fn extra_length_mm(thick_mm: f64, radius_mm: f64, roundness: f64) -> f64 {
     if radius_mm <= 0.0 || thick_mm <= 0.0 {
         return 0.0;
     }
     let ratio = radius_mm / thick_mm;
     let of = |[c0, c1, c2]: [f64; 3]| thick_mm * (c0 + c1 * ratio.sqrt() + c2 * ratio);
     let round = roundness.clamp(0.0, 1.0).powi(2);
-    let [c0, c1, c2] = LEAF;
-    let leaf = match shape {
-        SectionShape::Rectangle => of(LEAF),
-        SectionShape::Ellipse => of([c0 * STRIPS[0], c1 * STRIPS[1], c2]),
-    };
-    leaf + (of(WIRE) - leaf) * round
+    of(LEAF) + (of(WIRE) - of(LEAF)) * round
 }
 
 /// Coefficients of the shoulder's formula by √(h/r) and h/r for one range of h/r.
@@ -103,8 +92,7 @@ mod tests {
     fn as_finite_elements() {
         for (rows, roundness) in [(&LEAVES[..], 0.0), (&WIRES[..], 1.0)] {
             for [t, r, extra, factor] in rows {
-                let shape = if roundness > 0.0 { SectionShape::Ellipse } else { SectionShape::Rectangle };
-                let here = extra_length_mm(*t, *r, roundness, shape) / t;
+                let here = extra_length_mm(*t, *r, roundness) / t;
                 assert!((here - extra).abs() < EXTRA, "t {t}, r {r}: {here} for {extra}");
                 let here = concentration(*t, *r, 4.4, roundness == 1.0).unwrap();
                 assert!((here / factor - 1.0).abs() < FACTOR, "t {t}, r {r}: {here} for {factor}");
@@ -114,7 +102,7 @@ mod tests {
 
     #[test]
     fn nothing_is_made_up() {
-        assert_eq!(extra_length_mm(0.8, 0.0, 0.0, SectionShape::Ellipse), 0.0);
+        assert_eq!(extra_length_mm(0.8, 0.0, 0.0), 0.0);
         for (t, r, d) in
             [(0.8, 0.0, 4.4), (0.8, 0.08, 4.4), (0.8, 20.0, 4.4), (4.4, 0.5, 4.4), (5.0, 0.5, 4.4)]
         {

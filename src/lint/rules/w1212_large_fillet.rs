@@ -20,7 +20,7 @@
 //! Take a smaller radius: at 0.6 times the thickness the stress at the root is a quarter above the flexure's own, and falls slowly from
 //! there on. There is no repair by itself.
 use crate::lint::prelude::*;
-use crate::rod::{SectionShape, extra_length_mm};
+use crate::rod::extra_length_mm;
 
 /// See the module.
 pub const RULE: Rule =
@@ -33,7 +33,7 @@ const RATIO: f64 = 3.0;
 
 fn check(view: &OfFlexures) -> Vec<Diagnostic> {
     let part = |f: &crate::lint::Flexure| {
-        2.0 * extra_length_mm(f.most_thick_mm, f.fillet_mm, f.most_thick_mm / f.wide_mm, SectionShape::Rectangle) / f.length_mm
+        2.0 * extra_length_mm(f.most_thick_mm, f.fillet_mm, f.most_thick_mm / f.wide_mm) / f.length_mm
     };
     let worst = |f: &crate::lint::Flexure| {
         (part(f) > PART || f.fillet_mm > RATIO * f.thick_mm).then(|| part(f))
