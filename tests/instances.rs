@@ -95,6 +95,12 @@ fn simulated(text: &str, steps: usize, poses: bool) -> Simulation {
     found.unwrap_or_else(|| panic!("{:?}", out.diagnostics))
 }
 
+/// Each design over its own cycle.
+fn simulated_apart(a: &Assembly, values: &[Vec<f64>]) -> Vec<Simulation> {
+    let simulated = |(d, v): (&Design, &Vec<f64>)| Compiler::default().simulate(d, v).unwrap();
+    a.designs.iter().zip(values).map(simulated).collect()
+}
+
 #[test]
 fn a_mechanism_by_itself_is_an_assembly_of_one() {
     let out = elaborate("chebyshev.mech", &common::ExampleFiles, &Options::default());
@@ -353,7 +359,7 @@ fn a_mirrored_half_with_a_ground_in_common_is_printed_as_one_part() {
     let a = in_place(text);
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
     let compiler = Compiler::default();
-    let Parts { artefacts, diagnostics: found, .. } = compiler.parts(&a, &starts).unwrap();
+    let Parts { artefacts, diagnostics: found, .. } = compiler.parts(&a, &starts, &Plans::default()).unwrap();
     assert_eq!(found, []);
     let parts = meshes(&artefacts);
     let names: Vec<&str> = parts.iter().map(|p| p.0.as_str()).collect();
@@ -366,11 +372,17 @@ fn a_mirrored_half_with_a_ground_in_common_is_printed_as_one_part() {
     let half = check_mesh(&meshes(&half)[0].1);
     assert!(facts.volume_mm3 < 2.0 * half.volume_mm3 && facts.volume_mm3 > 1.8 * half.volume_mm3);
     // The same bytes again, and a solid to others too.
-    assert_eq!(compiler.parts(&a, &starts).unwrap().artefacts, artefacts);
+    assert_eq!(compiler.parts(&a, &starts, &Plans::default()).unwrap().artefacts, artefacts);
+    // And where the links are known from the simulation.
+    let simulations = simulated_apart(&a, &starts);
+    let plans = Plans::of(&simulations, &compiler.between(&a, &simulations));
+    assert!(plans.whole.is_some() && plans.designs.iter().all(Option::is_some));
+    assert_eq!(compiler.parts(&a, &starts, &plans).unwrap().artefacts, artefacts);
     common::accepted_by_others(&artefacts);
     // Apart they are two parts of one common body, and that is told.
     let far = assembly(&text.replace("at (0 mm, 0 mm)", "at (30 mm, 0 mm)"));
-    let Parts { artefacts, diagnostics: found, .. } = compiler.parts(&far, &starts).unwrap();
+    let Parts { artefacts, diagnostics: found, .. } =
+        compiler.parts(&far, &starts, &Plans::default()).unwrap();
     assert_eq!(found.iter().map(|d| d.code.as_str()).collect::<Vec<_>>(), ["W0640"]);
     let parts = meshes(&artefacts);
     assert_eq!(parts.len(), 2);
@@ -399,7 +411,8 @@ fn the_gap_between_instances_is_measured_in_every_state() {
     let text = pair(18.0);
     let a = assembly(&text);
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
-    let between = Compiler::default().between(&a, &starts);
+    let simulations: Vec<Simulation> = simulated_apart(&a, &starts);
+    let between = Compiler::default().between(&a, &simulations);
     assert_eq!(between.diagnostics, []);
     let tips: Vec<f64> =
         simulated(&text, 4, false).motion.states.iter().map(|s| s.traces_mm[0][0].abs()).collect();
@@ -487,7 +500,8 @@ fn instances_in_each_others_way_are_told() {
     let text = include_str!("instances/butterfly.mech").replace("sharing base", "");
     let a = assembly(&text);
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
-    let Parts { artefacts, diagnostics: found, .. } = Compiler::default().parts(&a, &starts).unwrap();
+    let Parts { artefacts, diagnostics: found, .. } =
+        Compiler::default().parts(&a, &starts, &Plans::default()).unwrap();
     assert_eq!(found.iter().map(|d| d.code.as_str()).collect::<Vec<_>>(), ["E0641"]);
     let names: Vec<&str> = artefacts.iter().map(|a| a.name.as_str()).collect();
     assert_eq!(names, ["butterfly_right_base.stl", "butterfly_left_base.stl"]);
@@ -502,7 +516,8 @@ fn merged_grounds_are_one_part() {
     let a = assembly(&text);
     assert_eq!(a.joined.len(), 1);
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
-    let Parts { artefacts, diagnostics: found, .. } = Compiler::default().parts(&a, &starts).unwrap();
+    let Parts { artefacts, diagnostics: found, .. } =
+        Compiler::default().parts(&a, &starts, &Plans::default()).unwrap();
     assert_eq!(found, []);
     let parts = meshes(&artefacts);
     assert_eq!(parts.iter().map(|p| p.0.as_str()).collect::<Vec<_>>(), ["twins_board.stl"]);
@@ -524,7 +539,8 @@ fn merged_grounds_that_coincide_are_one_sound_part() {
     let a = assembly(&text);
     assert_eq!((a.joined.len(), a.instances.len()), (1, 4));
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
-    let Parts { artefacts, diagnostics: found, .. } = Compiler::default().parts(&a, &starts).unwrap();
+    let Parts { artefacts, diagnostics: found, .. } =
+        Compiler::default().parts(&a, &starts, &Plans::default()).unwrap();
     assert_eq!(found, []);
     let [(name, mesh)] = meshes(&artefacts).try_into().unwrap();
     let facts = check_mesh(&mesh);
@@ -542,7 +558,8 @@ fn board(points: &str) -> (Vec<(String, Mesh)>, Vec<String>) {
         .replace("export stl", "export stl(assembled)");
     let a = assembly(&text);
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
-    let Parts { artefacts, diagnostics: found, .. } = Compiler::default().parts(&a, &starts).unwrap();
+    let Parts { artefacts, diagnostics: found, .. } =
+        Compiler::default().parts(&a, &starts, &Plans::default()).unwrap();
     (meshes(&artefacts), found.into_iter().map(|d| d.code).collect())
 }
 
@@ -682,7 +699,8 @@ fn halves_with_a_moving_body_in_common_are_printed_as_one_part() {
     // An arm so wide that the leaves of one half keep clear of the other.
     let a = in_place(&CAR.replace("R = (14 mm, 24 mm)", "R = (20 mm, 24 mm)"));
     let starts: Vec<Vec<f64>> = a.designs.iter().map(|d| d.free.iter().map(|f| f.start).collect()).collect();
-    let Parts { artefacts, diagnostics: found, .. } = Compiler::default().parts(&a, &starts).unwrap();
+    let Parts { artefacts, diagnostics: found, .. } =
+        Compiler::default().parts(&a, &starts, &Plans::default()).unwrap();
     assert_eq!(found, []);
     let parts = meshes(&artefacts);
     assert_eq!(parts.iter().map(|p| p.0.as_str()).collect::<Vec<_>>(), ["car_right_chassis.stl"]);

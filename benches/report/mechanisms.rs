@@ -5,7 +5,7 @@ use super::{MILLI, Report, Time, WHOLE, once};
 use flexura::equilibrium::{Model, sweep, sweep_both_ways};
 use flexura::ir::{Design, ExportKind};
 use flexura::optimize::Problem;
-use flexura::pipeline::{Compiler, EDGES, Stages};
+use flexura::pipeline::{Compiler, EDGES, Plans, Stages};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -91,7 +91,9 @@ pub fn meshes(report: &mut Report) {
         let compiler = Compiler::default();
         let mut bytes = 0;
         let mut mesh = || {
-            let parts = compiler.parts(&assembly, &values).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+            let parts = compiler
+                .parts(&assembly, &values, &Plans::default())
+                .unwrap_or_else(|e| panic!("{name}: {e:?}"));
             bytes = parts.artefacts.iter().map(|p| p.bytes.len()).sum();
         };
         let (one, two) = (report.time(&mut mesh), report.time_on_two(&mut mesh));

@@ -25,6 +25,10 @@ pub fn side(a: &Point, b: &Point, c: &Point, p: &Point) -> Ordering {
     const ROUNDING: f64 = 1e-15;
     let from_a = |q: &Point| [q[0] - a[0], q[1] - a[1], q[2] - a[2]];
     let (u, v, w) = (from_a(b), from_a(c), from_a(p));
+    // Flat faces of layers are the most of what is in one plane.
+    if (0..3).any(|k| u[k] == 0 && v[k] == 0 && w[k] == 0) {
+        return Ordering::Equal;
+    }
     let [x, y, z] = [u, v, w].map(|d| d.map(|i| i as f64));
     let terms = [
         (x[1] * y[2], x[2] * y[1], z[0]),
@@ -46,8 +50,14 @@ pub fn side(a: &Point, b: &Point, c: &Point, p: &Point) -> Ordering {
 /// On which side of the line from `a` to `b` a point lies, in the plane without coordinate `dropped`.
 fn side_in_plane(a: &Point, b: &Point, p: &Point, dropped: usize) -> Ordering {
     let (i, j) = ((dropped + 1) % 3, (dropped + 2) % 3);
-    let d = |q: &Point, k: usize| i128::from(q[k] - a[k]);
-    (d(b, i) * d(p, j) - d(b, j) * d(p, i)).cmp(&0)
+    let [x, y] = [b, p].map(|q| [q[i] - a[i], q[j] - a[j]]);
+    // Differences are exact in floats, their products to half a unit each.
+    let [s, t] = [x[0] as f64 * y[1] as f64, x[1] as f64 * y[0] as f64];
+    if (s - t).abs() > 4.0 * f64::EPSILON * (s.abs() + t.abs()) {
+        return s.total_cmp(&t);
+    }
+    let [x, y] = [x, y].map(|d| d.map(i128::from));
+    (x[0] * y[1] - x[1] * y[0]).cmp(&0)
 }
 
 /// A coordinate without which the triangle still has an area; none: it has none.
