@@ -177,7 +177,11 @@ fn links_in_space_follow_every_parameter() {
     let layout = Layout::new(&design, &motion, &start);
     let at = |p: &[f64]| {
         let model = Model::new(&design, &layout, p, EDGES, true).unwrap();
-        skeleton_capsules(&design, &plan_bodies(&parts_input(&design, &layout, &model).unfilleted()).unwrap(), &model)
+        skeleton_capsules(
+            &design,
+            &plan_bodies(&parts_input(&design, &layout, &model).unfilleted()).unwrap(),
+            &model,
+        )
     };
     let here = at(&start);
     let mut moving = 0;
