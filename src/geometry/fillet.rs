@@ -129,7 +129,7 @@ impl FlexureSolid {
     }
 
     /// The place at a way from an end along the centreline, with the number of the stations that lie nearer to it.
-    pub(super) fn from_end(&self, at_end: bool, way_mm: f64) -> (Vector3<f64>, usize) {
+    pub(super) fn place_from_end(&self, at_end: bool, way_mm: f64) -> (Vector3<f64>, usize) {
         let n = self.centreline.len();
         let at = |k: usize| self.centreline[if at_end { n - 1 - k } else { k }];
         let mut left = way_mm;

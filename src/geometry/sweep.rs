@@ -73,7 +73,7 @@ impl FlexureSolid {
         let count = self.centreline.len().min(self.m2.len()).min(self.a_mm.len()).min(self.b_mm.len());
         let zones = [false, true].map(|at_end| {
             let fillet = self.fillets[usize::from(at_end)]?;
-            let (place, stations) = self.from_end(at_end, fillet.start_mm);
+            let (place, stations) = self.place_from_end(at_end, fillet.start_mm);
             Some((place, if at_end { count.saturating_sub(stations) } else { stations }, fillet))
         });
         (1..count)
@@ -87,20 +87,16 @@ impl FlexureSolid {
                 let (mut from, mut to) = (p, q);
                 let mut pieces = Vec::with_capacity(1);
                 let grown = |f: &Fillet| (a + f.flare_mm(), b + f.flare_mm() * f.all_round);
-                if let Some((place, station, f)) = &zones[0] {
-                    if i <= *station {
-                        from = if i == *station { *place } else { q };
-                        let (a, b) = grown(f);
-                        pieces.push((i, p, from, a, b));
-                    }
+                if let Some((place, station, f)) = zones[0].as_ref().filter(|(_, station, _)| i <= *station) {
+                    from = if i == *station { *place } else { q };
+                    let (a, b) = grown(f);
+                    pieces.push((i, p, from, a, b));
                 }
                 let mut last = None;
-                if let Some((place, station, f)) = &zones[1] {
-                    if i >= *station {
-                        to = if i == *station { *place } else { p };
-                        let (a, b) = grown(f);
-                        last = Some((i, to, q, a, b));
-                    }
+                if let Some((place, station, f)) = zones[1].as_ref().filter(|(_, station, _)| i >= *station) {
+                    to = if i == *station { *place } else { p };
+                    let (a, b) = grown(f);
+                    last = Some((i, to, q, a, b));
                 }
                 if (zones[0].is_none() && zones[1].is_none()) || (to - from).dot(&(q - p)) > 0.0 {
                     pieces.push((i, from, to, a, b));
