@@ -5,7 +5,7 @@
 
 mod common;
 
-use flexura::elaborate::{FileError, Files, Options, elaborate};
+use flexura::elaborate::{FileError, Files, Options, SolidFile, elaborate};
 use flexura::emit::lock::Lock;
 use flexura::equilibrium::{Equilibrium, Layout, Model, sweep};
 use flexura::geometry::{
@@ -20,6 +20,7 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Edges of a rod in the sweep, and in the mesh.
 const EDGES: usize = 20;
@@ -43,6 +44,11 @@ struct Folder(PathBuf);
 impl Files for Folder {
     fn read(&self, path: &str) -> Result<String, FileError> {
         std::fs::read_to_string(self.0.join(path)).map_err(|_| FileError::NotFound)
+    }
+
+    fn solid(&self, path: &str) -> Result<Arc<SolidFile>, FileError> {
+        let bytes = std::fs::read(self.0.join(path)).map_err(|_| FileError::NotFound)?;
+        Ok(Arc::new(SolidFile::new(bytes)))
     }
 }
 
