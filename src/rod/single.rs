@@ -2,7 +2,7 @@
 //! problem, for references and quick checks of one flexure. Mechanisms are solved by `equilibrium`.
 
 use super::{FactorReport, RetractError, Rod, RodForces, RodState, RodSystem};
-use crate::math::{Pose, exp_so3};
+use crate::math::Pose;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use std::fmt;
 
@@ -144,8 +144,13 @@ impl SingleRod {
         for k in 2..=last {
             let e = at[k] - at[k - 1];
             let by = moved(k, increment);
-            let (change, length2) = (by - before, e.norm_squared());
-            here += exp_so3(&(e.cross(&change) / length2)) * e * (1.0 + e.dot(&change) / length2);
+            let (change, length) = (by - before, e.norm());
+            let stretch = e.dot(&change) / (length * length);
+            // Turned within the plane of the edge and its change.
+            let across = change - e * stretch;
+            let (sin, cos) = (across.norm() / length).sin_cos();
+            let aside = across.norm().max(f64::MIN_POSITIVE);
+            here += (e * cos + across * (sin * length / aside)) * (1.0 + stretch);
             before = by;
             if k < last {
                 increment[4 * k - 7..4 * k - 4].copy_from_slice((here - at[k]).as_slice());
