@@ -3,13 +3,13 @@
 //
 //     node check_view.mjs FLEXURA DESIGN.mech PARAMETER [--pictures FOLDER] [--local SOURCE_FOLDER]
 //
-// The design is copied beside its lock and changed there. `--local` serves scripts and styles from the source tree, to try
+// The design's folder (its lock, tables and solids with it) is copied and changed there. `--local` serves scripts and styles from the source tree, to try
 // changes to them. `puppeteer-core` is looked for along NODE_PATH, the browser in $CHROMIUM or as /usr/bin/chromium.
 import { createRequire } from "node:module";
 import { spawn } from "node:child_process";
-import { copyFileSync, existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { cpSync, existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
-import { basename, join } from "node:path";
+import { basename, dirname, join } from "node:path";
 
 const require = createRequire(import.meta.url);
 const puppeteer = require("puppeteer-core");
@@ -31,8 +31,7 @@ function must(holds, what) {
 
 const folder = mkdtempSync(join(tmpdir(), "flexura-view-"));
 const source = join(folder, basename(design)), lock = source.replace(/\.mech$/, ".lock");
-copyFileSync(design, source);
-if (existsSync(design.replace(/\.mech$/, ".lock"))) copyFileSync(design.replace(/\.mech$/, ".lock"), lock);
+cpSync(dirname(design), folder, { recursive: true, filter: (path) => basename(path) !== "out" });
 const text = readFileSync(source, "utf8");
 
 const view = spawn(flexura, ["view", source], { stdio: ["ignore", "pipe", "inherit"] });
