@@ -2,8 +2,10 @@
 //! Megaro et al. 2017, section 4.2).
 
 use super::model::{Model, State};
-use super::newton::{Equilibrium, SolveError, Solver};
+use super::newton::{Begin, Equilibrium, Halt, SolveError, Solver};
 use crate::math::Pose;
+use crate::math::fronts::Factors;
+use crate::rod::{RodForces, RodSystem};
 use nalgebra::{DVector, Matrix3, SMatrix, SVector, Vector3};
 
 /// Smallest part of the load that is still tried when the whole cannot be applied at once.
@@ -65,6 +67,15 @@ impl PointForce {
     }
 }
 
+/// A case after its first iteration.
+struct Begun {
+    begin: Begin,
+    /// Forces that each rod is to expect.
+    expected: Vec<RodForces>,
+    /// Of links and multipliers, at the state before.
+    factors: Factors,
+}
+
 impl Solver {
     /// The equilibrium under `loads` with the drives held at `target`, from an equilibrium without them; in
     /// parts where the whole load moves it too far at once.
@@ -78,8 +89,83 @@ impl Solver {
         target: &[f64],
         loads: &[PointForce],
     ) -> Result<Equilibrium, SolveError> {
-        let mut state: State = from.state.clone();
-        let (mut done, mut part) = (0.0, 1.0f64);
+        self.load_in_parts(model, &from.state, target, loads, 1.0)
+    }
+
+    /// The states under each of several loads, as [`Self::load`] finds them: the step from the state without them
+    /// shares its rods.
+    ///
+    /// # Errors
+    /// [`SolveError`] where one finds no equilibrium.
+    pub fn load_each(
+        &mut self,
+        model: &Model,
+        from: &Equilibrium,
+        target: &[f64],
+        cases: &[&[PointForce]],
+    ) -> Result<Vec<State>, SolveError> {
+        let begun = self.begin_each(model, &from.state, target, cases);
+        let rods_factored = self.rods_factored;
+        let find = |(loads, begun): (&&[PointForce], Option<Begun>)| {
+            let mut part = 1.0;
+            if let Some(Begun { mut begin, expected, factors }) = begun {
+                expected.iter().zip(&mut self.systems).for_each(|(f, s)| s.expect_forces(f));
+                self.factors = Some(factors);
+                begin.factors_at_hand = self.rods_factored == rods_factored;
+                match self.go_on(model, begin, target, loads) {
+                    Ok(state) => return Ok(state),
+                    Err(Halt::FactorsGone) => {}
+                    Err(Halt::Failed(_)) => part = 0.5,
+                }
+            }
+            Ok(self.load_in_parts(model, &from.state, target, loads, part)?.state)
+        };
+        cases.iter().zip(begun).map(find).collect()
+    }
+
+    /// The first iteration of each case; none where there is no such step.
+    fn begin_each(
+        &mut self,
+        model: &Model,
+        from: &State,
+        target: &[f64],
+        cases: &[&[PointForce]],
+    ) -> Vec<Option<Begun>> {
+        self.take_sizes(model, target);
+        let rods = self.assemble_rods(model, from);
+        self.factor_rods(false);
+        let mut begin = |loads: &&[PointForce]| {
+            self.take_loads(loads);
+            let residual = self.residual(model, from, target, &rods);
+            if residual.small() || !residual.is_finite() {
+                return None;
+            }
+            self.factor_links(model, from, false);
+            let mut state = from.clone();
+            let taken = self.step(model, &mut state, target).ok()?;
+            let before_n = (taken >= 1.0).then_some(residual.force_n);
+            let expected = self.systems.iter().map(|s| s.expected.clone()).collect();
+            Some(Begun {
+                begin: Begin { iteration: 1, before_n, ..state.into() },
+                expected,
+                factors: self.factors.take()?,
+            })
+        };
+        let begun = cases.iter().map(&mut begin).collect();
+        self.systems.iter_mut().for_each(RodSystem::forget_expected);
+        begun
+    }
+
+    fn load_in_parts(
+        &mut self,
+        model: &Model,
+        from: &State,
+        target: &[f64],
+        loads: &[PointForce],
+        mut part: f64,
+    ) -> Result<Equilibrium, SolveError> {
+        let mut state = from.clone();
+        let mut done = 0.0;
         loop {
             let next = (done + part).min(1.0);
             let scaled: Vec<PointForce> =

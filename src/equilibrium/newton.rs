@@ -83,6 +83,8 @@ pub struct Solver {
     pub(super) factors: Option<Factors>,
     pub(super) scale: DVector<f64>,
     pub(super) rods_positive: bool,
+    /// How often the rods were factored: factors of the same number are the same.
+    pub(super) rods_factored: u64,
     pub(super) jacobian: Jacobian,
     /// Of the last solution asked for.
     pub(super) loads: Vec<PointForce>,
@@ -90,16 +92,73 @@ pub struct Solver {
     pub(super) sizes: Vec<f64>,
 }
 
+/// Where Newton's method begins.
+pub(super) struct Begin {
+    pub(super) state: State,
+    /// Iterations already taken.
+    pub(super) iteration: usize,
+    /// Force residual before the last of them, N, where that was a full step.
+    pub(super) before_n: Option<f64>,
+    /// Whether the rods' factors are still those of that step.
+    pub(super) factors_at_hand: bool,
+}
+
+impl From<State> for Begin {
+    fn from(state: State) -> Self {
+        Self { state, iteration: 0, before_n: None, factors_at_hand: true }
+    }
+}
+
+/// Why an iteration ended without a state in balance.
+pub(super) enum Halt {
+    Failed(SolveError),
+    /// It would go on with factors that are no longer at hand.
+    FactorsGone,
+}
+
+impl From<SolveError> for Halt {
+    fn from(error: SolveError) -> Self {
+        Self::Failed(error)
+    }
+}
+
+impl From<Halt> for SolveError {
+    fn from(halt: Halt) -> Self {
+        match halt {
+            Halt::Failed(error) => error,
+            Halt::FactorsGone => Self::NotConverged,
+        }
+    }
+}
+
+/// A state in balance, for which the rods are assembled, but nothing is factored yet.
+pub(super) struct Settled {
+    pub(super) state: State,
+    iterations: usize,
+    tolerance_n: f64,
+}
+
+/// What all rods together add to a residual.
+pub(super) struct AssembledRods {
+    gradient: DVector<f64>,
+    internal_n: f64,
+    tolerance_n: f64,
+}
+
 /// Sizes of what is not yet in balance.
-struct Residual {
-    force_n: f64,
+pub(super) struct Residual {
+    pub(super) force_n: f64,
     constraint_mm: f64,
     tolerance_n: f64,
 }
 
 impl Residual {
-    fn small(&self) -> bool {
+    pub(super) fn small(&self) -> bool {
         self.force_n <= self.tolerance_n && self.constraint_mm <= CONSTRAINT_MM
+    }
+
+    pub(super) fn is_finite(&self) -> bool {
+        self.force_n.is_finite() && self.constraint_mm.is_finite()
     }
 
     /// Whether one more step with the same factors does, after a full one that brought the force down from `before_n`.
@@ -141,6 +200,7 @@ impl Solver {
             factors: None,
             scale,
             rods_positive: false,
+            rods_factored: 0,
             jacobian: Jacobian::default(),
             loads: Vec::new(),
             sizes: Vec::new(),
@@ -168,10 +228,49 @@ impl Solver {
         target: &[f64],
         loads: &[PointForce],
     ) -> Result<Equilibrium, SolveError> {
+        self.take_loads(loads);
+        self.take_sizes(model, target);
+        let settled = self.settle(model, state.into(), target, ITERATIONS)?;
+        Ok(self.complete(model, settled, target))
+    }
+
+    /// Goes on to the equilibrium under `loads` from where it was begun.
+    ///
+    /// # Errors
+    /// [`Halt`].
+    pub(super) fn go_on(
+        &mut self,
+        model: &Model,
+        begin: Begin,
+        target: &[f64],
+        loads: &[PointForce],
+    ) -> Result<State, Halt> {
+        self.take_loads(loads);
+        self.take_sizes(model, target);
+        Ok(self.settle(model, begin, target, ITERATIONS)?.state)
+    }
+
+    /// Assembles and factors at an equilibrium found before, which takes no further iteration.
+    ///
+    /// # Errors
+    /// As [`Self::solve`] if the state given is none.
+    pub(super) fn return_to(
+        &mut self,
+        model: &Model,
+        state: &State,
+        target: &[f64],
+        loads: &[PointForce],
+    ) -> Result<(), SolveError> {
+        self.take_loads(loads);
+        self.take_sizes(model, target);
+        let mut settled = self.settle(model, state.clone().into(), target, ITERATIONS)?;
+        self.factor_settled(model, &mut settled, target);
+        Ok(())
+    }
+
+    pub(super) fn take_loads(&mut self, loads: &[PointForce]) {
         self.loads.clear();
         self.loads.extend_from_slice(loads);
-        self.take_sizes(model, target);
-        self.iterate(model, state, target, ITERATIONS)
     }
 
     /// As [`Self::solve`] from a predicted `state`, near enough to be reached in a few iterations.
@@ -186,17 +285,12 @@ impl Solver {
     ) -> Result<Equilibrium, SolveError> {
         self.loads.clear();
         self.take_sizes(model, target);
-        self.iterate(model, state, target, STEP_ITERATIONS)
+        let settled = self.settle(model, state.into(), target, STEP_ITERATIONS)?;
+        Ok(self.complete(model, settled, target))
     }
 
-    fn iterate(
-        &mut self,
-        model: &Model,
-        state: State,
-        target: &[f64],
-        limit: usize,
-    ) -> Result<Equilibrium, SolveError> {
-        let found = self.iterations(model, state, target, limit);
+    fn settle(&mut self, model: &Model, begin: Begin, target: &[f64], limit: usize) -> Result<Settled, Halt> {
+        let found = self.iterations(model, begin, target, limit);
         if found.is_err() {
             self.systems.iter_mut().for_each(RodSystem::forget_expected);
         }
@@ -206,68 +300,102 @@ impl Solver {
     fn iterations(
         &mut self,
         model: &Model,
-        mut state: State,
+        begin: Begin,
         target: &[f64],
         limit: usize,
-    ) -> Result<Equilibrium, SolveError> {
-        // Force residual before a full step with the factors at hand.
-        let mut before: Option<f64> = None;
-        for iteration in 0..limit {
-            let residual = self.assemble(model, &mut state, target);
-            if !(residual.force_n.is_finite() && residual.constraint_mm.is_finite()) {
-                return Err(SolveError::NotFinite);
+    ) -> Result<Settled, Halt> {
+        let Begin { mut state, iteration, mut before_n, mut factors_at_hand } = begin;
+        for iterations in iteration..limit {
+            let residual = self.assemble(model, &state, target);
+            if !residual.is_finite() {
+                return Err(SolveError::NotFinite.into());
             }
             if residual.small() {
-                if self.systems.iter().any(|s| !s.is_exact(residual.tolerance_n)) {
-                    self.assemble(model, &mut state, target);
-                }
-                let stable = self.factor(model, &state, true);
-                let energy_n_mm = self.systems.iter().map(|s| s.energy()).sum();
-                let strains = model.rods.iter().zip(&self.systems).map(|(r, s)| s.strains(&r.rod)).collect();
-                let load_potential_n_mm = model.load_potential_n_mm(&state, &self.sizes);
-                return Ok(Equilibrium {
-                    state,
-                    stable,
-                    energy_n_mm,
-                    load_potential_n_mm,
-                    strains,
-                    iterations: iteration,
-                });
+                return Ok(Settled { state, iterations, tolerance_n: residual.tolerance_n });
             }
-            let chord = before.take().is_some_and(|r| residual.serves_a_chord(r));
+            let chord = before_n.take().is_some_and(|r| residual.serves_a_chord(r));
+            if chord && !factors_at_hand {
+                return Err(Halt::FactorsGone);
+            }
             if chord {
                 self.systems.iter_mut().for_each(|s| {
                     s.condense_gradient();
                 });
             } else {
                 self.factor(model, &state, false);
+                factors_at_hand = true;
             }
-            let step = self.newton_step(model, &state, target);
-            if step.iter().any(|v| !v.is_finite()) {
-                return Err(SolveError::NotFinite);
-            }
-            let fraction = step_fraction(model, &step);
-            let taken = self.advance(model, &mut state, &step, fraction)?;
-            before = (!chord && taken >= 1.0).then_some(residual.force_n);
+            let taken = self.step(model, &mut state, target)?;
+            before_n = (!chord && taken >= 1.0).then_some(residual.force_n);
         }
-        Err(SolveError::NotConverged)
+        Err(SolveError::NotConverged.into())
+    }
+
+    /// Newton's step with the factors at hand, shortened where a link or rod would move too far; by which fraction.
+    pub(super) fn step(
+        &mut self,
+        model: &Model,
+        state: &mut State,
+        target: &[f64],
+    ) -> Result<f64, SolveError> {
+        let step = self.newton_step(model, state, target);
+        if step.iter().any(|v| !v.is_finite()) {
+            return Err(SolveError::NotFinite);
+        }
+        let fraction = step_fraction(model, &step);
+        self.advance(model, state, &step, fraction)
+    }
+
+    /// Factors at a settled state with its exact Hessian; whether it is a strict minimum.
+    fn factor_settled(&mut self, model: &Model, settled: &mut Settled, target: &[f64]) -> bool {
+        if self.systems.iter().any(|s| !s.is_exact(settled.tolerance_n)) {
+            self.assemble(model, &settled.state, target);
+        }
+        self.factor(model, &settled.state, true)
+    }
+
+    fn complete(&mut self, model: &Model, mut settled: Settled, target: &[f64]) -> Equilibrium {
+        let stable = self.factor_settled(model, &mut settled, target);
+        let Settled { state, iterations, .. } = settled;
+        let energy_n_mm = self.systems.iter().map(|s| s.energy()).sum();
+        let strains = model.rods.iter().zip(&self.systems).map(|(r, s)| s.strains(&r.rod)).collect();
+        let load_potential_n_mm = model.load_potential_n_mm(&state, &self.sizes);
+        Equilibrium { state, stable, energy_n_mm, load_potential_n_mm, strains, iterations }
     }
 
     /// Assembles all rods and measures the residual.
-    fn assemble(&mut self, model: &Model, state: &mut State, target: &[f64]) -> Residual {
-        let layout = &model.layout;
-        let mut gradient = DVector::zeros(layout.dofs());
-        let (mut internal, mut largest, mut least_stiffness, mut floor) = (0.0f64, 0.0f64, f64::MAX, 0.0f64);
+    fn assemble(&mut self, model: &Model, state: &State, target: &[f64]) -> Residual {
+        let rods = self.assemble_rods(model, state);
+        self.residual(model, state, target, &rods)
+    }
+
+    pub(super) fn assemble_rods(&mut self, model: &Model, state: &State) -> AssembledRods {
+        let mut gradient = DVector::zeros(model.layout.dofs());
+        let (mut internal_n, mut largest, mut least_stiffness, mut floor) =
+            (0.0f64, 0.0f64, f64::MAX, 0.0f64);
         for ((rod, system), rod_state) in model.rods.iter().zip(&mut self.systems).zip(&state.rods) {
             let [a, b] = rod.bodies;
             system.assemble(&rod.rod, rod_state, &state.poses[a], &state.poses[b]);
-            internal = internal.max(system.internal_residual_norm());
+            internal_n = internal_n.max(system.internal_residual_norm());
             largest = largest.max(system.largest_internal_force());
             least_stiffness =
                 least_stiffness.min(rod.rod.least_bending_stiffness() / rod.rod.length_mm().powi(2));
             floor = floor.max(system.rounding_floor(&rod.rod, rod_state));
             scatter(model, rod.bodies, system.link_gradient(), &mut gradient);
         }
+        let tolerance_n = RESIDUAL * largest.max(1e-3 * least_stiffness) + floor;
+        AssembledRods { gradient, internal_n, tolerance_n }
+    }
+
+    /// The residual of assembled rods with constraints, drives and the present loads.
+    pub(super) fn residual(
+        &mut self,
+        model: &Model,
+        state: &State,
+        target: &[f64],
+        rods: &AssembledRods,
+    ) -> Residual {
+        let mut gradient = rods.gradient.clone();
         let mut constraint_mm = 0.0f64;
         self.for_each_row(model, state, target, |_, bodies, lambda, residual, weight, row| {
             constraint_mm = constraint_mm.max((residual * weight).abs());
@@ -278,12 +406,11 @@ impl Solver {
             rows += g;
         });
         self.add_load_gradient(model, state, &mut gradient);
-        let mut force_n = internal;
+        let mut force_n = rods.internal_n;
         for i in 0..gradient.len() {
             force_n = force_n.max((gradient[i] * self.scale[i]).abs());
         }
-        let tolerance_n = RESIDUAL * largest.max(1e-3 * least_stiffness) + floor;
-        Residual { force_n, constraint_mm, tolerance_n }
+        Residual { force_n, constraint_mm, tolerance_n: rods.tolerance_n }
     }
 
     /// Right-hand side of the scaled system for a full Newton step, and its solution: link

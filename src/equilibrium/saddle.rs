@@ -57,16 +57,29 @@ impl Solver {
     /// shifted, and the answer says whether the state is a strict minimum; otherwise rods and links
     /// are shifted until the step is one of descent.
     pub(super) fn factor(&mut self, model: &Model, state: &State, exact: bool) -> bool {
+        self.factor_rods(exact);
+        self.factor_links(model, state, exact)
+    }
+
+    /// Factors and condenses the rods as assembled.
+    pub(super) fn factor_rods(&mut self, exact: bool) {
+        self.rods_positive = true;
+        self.rods_factored += 1;
+        for system in &mut self.systems {
+            let report = if exact { system.factor_unshifted() } else { system.factor() };
+            self.rods_positive &= report.negative_pivots == 0;
+            system.condense();
+        }
+    }
+
+    /// The rest of [`Self::factor`], with rods condensed.
+    pub(super) fn factor_links(&mut self, model: &Model, state: &State, exact: bool) -> bool {
         let n = model.layout.dofs();
         let m = model.rows();
         let order = Arc::clone(&self.order);
         let mut k = Blocks::new(&order);
-        self.rods_positive = true;
-        for (rod, system) in model.rods.iter().zip(&mut self.systems) {
-            let report = if exact { system.factor_unshifted() } else { system.factor() };
-            self.rods_positive &= report.negative_pivots == 0;
-            let (_, hessian) = system.condense();
-            scatter_matrix(model, &order, rod.bodies, hessian, &mut k);
+        for (rod, system) in model.rods.iter().zip(&self.systems) {
+            scatter_matrix(model, &order, rod.bodies, system.condensed_hessian(), &mut k);
         }
         let mut row = 0;
         for c in &model.layout.constraints {

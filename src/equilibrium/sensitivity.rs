@@ -6,7 +6,8 @@ use super::load::{PointForce, PointForceChange};
 use super::model::{Model, State};
 use super::newton::{Equilibrium, SolveError, Solver};
 use super::saddle::scatter;
-use crate::rod::{EdgeJacobian, StrainJacobian};
+use crate::math::Pose;
+use crate::rod::{EdgeJacobian, ParameterMatrix, Rod, RodSystem, SensitivityError, StrainJacobian};
 use nalgebra::{DMatrix, DVector};
 
 /// First derivatives of one equilibrium by the n design parameters.
@@ -18,6 +19,9 @@ pub struct Sensitivity {
     /// Multipliers, rows × n.
     pub lambda: DMatrix<f64>,
 }
+
+/// How much of a rod's derivatives is worked out.
+type ColumnsOf = fn(&mut RodSystem, &Rod, &Pose, &Pose) -> Result<ParameterMatrix, SensitivityError>;
 
 /// Reused by one thread.
 pub struct SensitivityWorkspace {
@@ -40,48 +44,45 @@ impl SensitivityWorkspace {
         equilibrium: &Equilibrium,
         target: &[f64],
     ) -> Result<Sensitivity, SolveError> {
-        self.at_loaded(model, equilibrium, target, &[])
+        self.differentiate(model, &equilibrium.state, target, &[], &[], RodSystem::parameter_columns)
     }
 
-    /// The same at an equilibrium under dead forces that do not depend on the parameters.
+    /// Of links and multipliers alone, in a state under dead forces that change with the geometry: `load_changes` has, for each
+    /// of the layout's changes, one a load. [`Self::edge`] and [`Self::strains`] do not follow from it.
     ///
     /// # Errors
-    /// [`SolveError`] if the equilibrium given is none.
-    pub fn at_loaded(
+    /// [`SolveError`] if the state given is no equilibrium, or the layout has no derivatives.
+    pub fn of_links(
         &mut self,
         model: &Model,
-        equilibrium: &Equilibrium,
-        target: &[f64],
-        loads: &[PointForce],
-    ) -> Result<Sensitivity, SolveError> {
-        self.at_moving(model, equilibrium, target, loads, &[])
-    }
-
-    /// The same under dead forces that change with the geometry: `load_changes` has, for each of the layout's
-    /// changes, one a load; or it is empty.
-    ///
-    /// # Errors
-    /// [`SolveError`] if the equilibrium given is none, or the layout has no derivatives.
-    pub fn at_moving(
-        &mut self,
-        model: &Model,
-        equilibrium: &Equilibrium,
+        state: &State,
         target: &[f64],
         loads: &[PointForce],
         load_changes: &[Vec<PointForceChange>],
+    ) -> Result<Sensitivity, SolveError> {
+        self.differentiate(model, state, target, loads, load_changes, RodSystem::links_parameter_columns)
+    }
+
+    fn differentiate(
+        &mut self,
+        model: &Model,
+        state: &State,
+        target: &[f64],
+        loads: &[PointForce],
+        load_changes: &[Vec<PointForceChange>],
+        columns_of: ColumnsOf,
     ) -> Result<Sensitivity, SolveError> {
         if model.layout.changes.is_none() {
             return Err(SolveError::NoDerivatives);
         }
         let solver = &mut self.solver;
-        // Assembles and factors at the state itself; an accepted one takes no further iteration.
-        solver.solve_loaded(model, equilibrium.state.clone(), target, loads)?;
+        solver.return_to(model, state, target, loads)?;
         let (n, m) = (model.layout.dofs(), model.rows());
         let parameters = model.p.len();
         let mut rhs = DMatrix::zeros(n + m, parameters);
         for (rod, system) in model.rods.iter().zip(&mut solver.systems) {
-            let [a, b] = rod.bodies.map(|b| &equilibrium.state.poses[b]);
-            let columns = system.parameter_columns(&rod.rod, a, b);
+            let [a, b] = rod.bodies.map(|b| &state.poses[b]);
+            let columns = columns_of(system, &rod.rod, a, b);
             let columns = columns.map_err(|_| SolveError::NoDerivatives)? * &rod.dq_dp;
             for (half, body) in rod.bodies.into_iter().enumerate() {
                 if let Some(first) = model.layout.bodies[body].first_dof {
@@ -92,12 +93,12 @@ impl SensitivityWorkspace {
         }
         for (i, change) in model.layout.changes.iter().flatten().enumerate() {
             let mut by = DVector::zeros(n + m);
-            geometry_column(model, &equilibrium.state, &solver.sizes, change, &mut by);
+            geometry_column(model, state, &solver.sizes, change, &mut by);
             let changes = load_changes.get(i).map_or(&[][..], |c| c);
             for (load, change) in loads.iter().zip(changes) {
                 if let Some(first) = model.layout.bodies[load.body].first_dof {
                     let mut rows = by.fixed_rows_mut::<6>(first);
-                    rows += load.gradient_change(&equilibrium.state.poses[load.body], change);
+                    rows += load.gradient_change(&state.poses[load.body], change);
                 }
             }
             let mut column = rhs.column_mut(change.parameter);

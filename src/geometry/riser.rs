@@ -81,10 +81,10 @@ fn sphere(slots: &[Slot]) -> Option<(Vector3<f64>, f64)> {
     slots.iter().map(reach).reduce(f64::max).map(|radius| (center, radius))
 }
 
-/// Whether a slot is nearer to one of the others than a bound.
-fn nearer<'n>(slot: &Slot, gap_mm: f64, near: impl IntoIterator<Item = &'n Near>) -> bool {
+/// Which of the others a slot is nearer to than a bound.
+fn nearer<'n>(slot: &Slot, gap_mm: f64, near: impl IntoIterator<Item = &'n Near>) -> Option<usize> {
     let (center, radius) = slot.bounding_sphere();
-    near.into_iter().any(|n| {
+    near.into_iter().position(|n| {
         (n.center - center).norm() - n.radius - radius < gap_mm
             && slot.signed_distance(&n.center) - n.radius < gap_mm + SURELY_MM
             && nearer_than(&n.slot, slot, gap_mm)
@@ -97,7 +97,11 @@ impl Builder<'_> {
         let moving = self.moving();
         let (center, radius) = slot.bounding_sphere();
         let within = |b: &&Bundle| (b.center - center).norm() - b.radius - radius < SURELY_MM - OVERLAP_MM;
-        moving.bundles.iter().filter(within).any(|b| nearer(slot, -OVERLAP_MM, self.near(moving, b)))
+        moving
+            .bundles
+            .iter()
+            .filter(within)
+            .any(|b| nearer(slot, -OVERLAP_MM, self.near(moving, b)).is_some())
     }
 
     /// Everything that moves, in every state, seen from this body.
@@ -294,7 +298,7 @@ impl Builder<'_> {
         let moving = self.moving();
         let bundles = moving.bundles.iter().filter(|b| within(&b.center, b.radius + SURELY_MM));
         let near = bundles.flat_map(|b| self.near(moving, b)).filter(|n| within(&n.center, n.radius));
-        let near: Vec<&Near> = near.collect();
+        let mut near: Vec<&Near> = near.collect();
         let first = super::slot::any_normal(&axis);
         let mut places: Vec<(f64, Vector3<f64>)> = Vec::new();
         for k in 0..DIRECTIONS {
@@ -312,8 +316,10 @@ impl Builder<'_> {
         let gap = self.input.clearance_mm;
         let free = |place: &Vector3<f64>| {
             let column = self.column_slot(&self.at_level(place, level), span, radius);
-            let near = || near.iter().copied();
-            !nearer(&column, gap, near()) && !nearer(&arm(place), gap, near())
+            let all = || near.iter().copied();
+            let in_the_way = nearer(&column, gap, all()).or_else(|| nearer(&arm(place), gap, all()));
+            // What is in one place's way is in many others' too: it is looked at first there.
+            in_the_way.inspect(|i| near[..=*i].rotate_right(1)).is_none()
         };
         places.into_iter().map(|(_, p)| p).find(free)
     }

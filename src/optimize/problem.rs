@@ -5,8 +5,7 @@ use super::guards;
 use super::normal::Normal;
 use super::objectives::{self, Level, StateView, StatesSensitivity, Term};
 use crate::equilibrium::{
-    Cycle, Equilibrium, Layout, Model, PointForce, PointForceChange, SensitivityWorkspace, Solver,
-    sweep_both_ways,
+    Cycle, Layout, Model, PointForce, PointForceChange, SensitivityWorkspace, Solver, State, sweep_both_ways,
 };
 use crate::geometry::{SkeletonCapsule, parts_input, plan_bodies, skeleton_capsules};
 use crate::ir::Design;
@@ -55,7 +54,7 @@ pub struct Trial<'d> {
     /// The links' shapes; empty where no term sees them.
     capsules: Vec<SkeletonCapsule>,
     /// Per counted state its equilibria under the load cases; empty without load cases.
-    loaded: Vec<Vec<Equilibrium>>,
+    loaded: Vec<Vec<State>>,
     /// The same point under the design's load cases.
     under: Vec<Trial<'d>>,
 }
@@ -262,12 +261,7 @@ impl<'d> Problem<'d> {
     }
 
     /// Equilibria under the load cases; none where one cannot be found.
-    fn load(
-        &self,
-        model: &Model<'d>,
-        cycle: &Cycle,
-        cases: &[Vec<PointForce>],
-    ) -> Option<Vec<Vec<Equilibrium>>> {
+    fn load(&self, model: &Model<'d>, cycle: &Cycle, cases: &[Vec<PointForce>]) -> Option<Vec<Vec<State>>> {
         if cases.is_empty() {
             return Some(Vec::new());
         }
@@ -277,10 +271,8 @@ impl<'d> Problem<'d> {
                 || Solver::new(model),
                 |solver, s| {
                     let target = target(model, s);
-                    let load = |case: &Vec<PointForce>| {
-                        solver.load(model, &cycle.states[s], &target, case.get(s..=s)?).ok()
-                    };
-                    cases.iter().map(load).collect()
+                    let loads: Option<Vec<_>> = cases.iter().map(|case| case.get(s..=s)).collect();
+                    solver.load_each(model, &cycle.states[s], &target, &loads?).ok()
                 },
             )
             .collect()
@@ -290,7 +282,7 @@ impl<'d> Problem<'d> {
         &self,
         model: &'a Model<'d>,
         cycle: &'a Cycle,
-        loaded: &'a [Vec<Equilibrium>],
+        loaded: &'a [Vec<State>],
         capsules: &'a [SkeletonCapsule],
         state: usize,
     ) -> StateView<'a> {
@@ -343,7 +335,7 @@ impl<'d> Problem<'d> {
                         .map(|(k, (case, e))| {
                             let of_state = |c: &Vec<PointForceChange>| c.get(s..=s).map(<[_]>::to_vec);
                             let moved: Vec<_> = changes.get(k)?.iter().filter_map(of_state).collect();
-                            workspace.at_moving(&trial.model, e, &target, case.get(s..=s)?, &moved).ok()
+                            workspace.of_links(&trial.model, e, &target, case.get(s..=s)?, &moved).ok()
                         })
                         .collect::<Option<Vec<_>>>()?;
                     let free = workspace.at(&trial.model, view.equilibrium, &target).ok()?;

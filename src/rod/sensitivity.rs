@@ -13,6 +13,7 @@ use super::{PARAMETERS, Rod, stretch_factor};
 use crate::math::dual::Dual;
 use crate::math::{Pose, banded::HALF_BANDWIDTH};
 use nalgebra::{DMatrix, SMatrix, SVector, Vector3};
+use std::ops::Range;
 
 /// Width of the joint solve: 12 link columns, 19 parameters, 3 for the force of rods with shear.
 pub(crate) const WIDTH: usize = 34;
@@ -34,6 +35,14 @@ pub(crate) struct ParameterColumns {
     pub(crate) slip: Option<Box<SlipDirections>>,
     /// Derivatives by q of the coordinates (x, θ, e) each end carries.
     pub(crate) ends: [SMatrix<f64, 7, PARAMETERS>; 2],
+}
+
+/// Derivatives by q at a fixed inside.
+struct DirectColumns {
+    /// See [`ParameterColumns::ends`].
+    ends: [SMatrix<f64, 7, PARAMETERS>; 2],
+    /// Of the whole banded gradient, through rest quantities and stiffnesses.
+    explicit: Vec<Row>,
 }
 
 /// Why sensitivities are not to be had.
@@ -83,76 +92,130 @@ impl RodSystem {
         rod: &Rod,
         pose_a: &Pose,
         pose_b: &Pose,
-    ) -> Result<&ParameterMatrix, SensitivityError> {
+    ) -> Result<ParameterMatrix, SensitivityError> {
         let rest = rod.derivatives.as_deref().ok_or(SensitivityError::NoDerivatives)?;
+        let direct = self.direct_columns(rod, rest, [pose_a, pose_b]);
+        let mut solved = self.right_hand_sides::<WIDTH>(&direct, FIRST_PARAMETER);
+        for (row, g) in solved.iter_mut().zip(self.force_columns()) {
+            row[FIRST_FORCE..].copy_from_slice(g);
+        }
+        for end in 0..2 {
+            let coupling = self.coupling(end);
+            for (i, row) in solved[self.coupled_rows(end)].iter_mut().enumerate() {
+                for c in 0..6 {
+                    row[6 * end + c] += coupling[(i, c)];
+                }
+            }
+        }
+        let (condensed, slip) = self.solve_columns(rest, &direct, &mut solved, FIRST_PARAMETER);
+        if let Some(slip) = &slip {
+            through_slip(&mut solved, slip);
+        }
+        let columns = ParameterColumns { condensed, solved, slip: slip.map(Box::new), ends: direct.ends };
+        self.columns = Some(Box::new(columns));
+        Ok(condensed)
+    }
+
+    /// The same numbers without what [`Self::internal_sensitivity`] and the derivatives of strains follow from.
+    ///
+    /// # Errors
+    /// When the rod has no derivatives.
+    pub fn links_parameter_columns(
+        &mut self,
+        rod: &Rod,
+        pose_a: &Pose,
+        pose_b: &Pose,
+    ) -> Result<ParameterMatrix, SensitivityError> {
+        let rest = rod.derivatives.as_deref().ok_or(SensitivityError::NoDerivatives)?;
+        let direct = self.direct_columns(rod, rest, [pose_a, pose_b]);
+        let mut solved = self.right_hand_sides::<PARAMETERS>(&direct, 0);
+        Ok(self.solve_columns(rest, &direct, &mut solved, 0).0)
+    }
+
+    /// What does not need the inside solved, for the unshifted Hessian.
+    fn direct_columns(
+        &mut self,
+        rod: &Rod,
+        rest: &RestShape<Dual<PARAMETERS>>,
+        poses: [&Pose; 2],
+    ) -> DirectColumns {
         if self.factored != Some(0.0) {
             self.factor_unshifted();
             self.condense();
         }
-        let n = self.n;
         let ends = [
-            end_derivatives(rest, 0, &pose_a.rotation, rod),
-            end_derivatives(rest, n - 1, &pose_b.rotation, rod),
+            end_derivatives(rest, 0, &poses[0].rotation, rod),
+            end_derivatives(rest, self.n - 1, &poses[1].rotation, rod),
         ];
-        let explicit = self.explicit_columns(rod, rest);
+        DirectColumns { ends, explicit: self.explicit_columns(rod, rest) }
+    }
 
-        let internal = self.factors.order();
-        let mut solved = vec![[0.0; WIDTH]; internal + HALF_BANDWIDTH];
-        for (row, g) in solved.iter_mut().zip(&explicit[FIRST_INTERNAL..4 * n - 4]) {
-            row[FIRST_PARAMETER..FIRST_FORCE].copy_from_slice(g);
+    /// Internal rows that one end couples to.
+    fn coupled_rows(&self, end: usize) -> Range<usize> {
+        let first = if end == 0 { 0 } else { self.factors.order() - END_COUPLING };
+        first..first + END_COUPLING
+    }
+
+    /// Coupling of the internal rows to the force of rods with shear; empty without.
+    fn force_columns(&self) -> &[[f64; 3]] {
+        self.shear.as_deref().map_or(&[], |shear| &shear.columns[FIRST_INTERNAL..4 * self.n - 4])
+    }
+
+    /// g_int,q from column `first` on, all else zero; scratch rows behind.
+    fn right_hand_sides<const W: usize>(&self, direct: &DirectColumns, first: usize) -> Vec<[f64; W]> {
+        let parameters = first..first + PARAMETERS;
+        let mut out = vec![[0.0; W]; self.factors.order() + HALF_BANDWIDTH];
+        for (row, g) in out.iter_mut().zip(&direct.explicit[FIRST_INTERNAL..4 * self.n - 4]) {
+            row[parameters.clone()].copy_from_slice(g);
         }
-        if let Some(shear) = &self.shear {
-            for (row, g) in solved.iter_mut().zip(&shear.columns[FIRST_INTERNAL..4 * n - 4]) {
-                row[FIRST_FORCE..].copy_from_slice(g);
+        for end in 0..2 {
+            let through_clamp = self.end_coupling(end) * direct.ends[end];
+            for (i, row) in out[self.coupled_rows(end)].iter_mut().enumerate() {
+                for (c, to) in row[parameters.clone()].iter_mut().enumerate() {
+                    *to += through_clamp[(i, c)];
+                }
             }
         }
+        out
+    }
+
+    /// Solves for the inside, and with that condenses the parameters, which begin at column `first`; with derivatives of slip
+    /// and force.
+    fn solve_columns<const W: usize>(
+        &self,
+        rest: &RestShape<Dual<PARAMETERS>>,
+        direct: &DirectColumns,
+        solved: &mut Vec<[f64; W]>,
+        first: usize,
+    ) -> (ParameterMatrix, Option<SlipDirections>) {
+        self.factors.forward(solved, 0);
+        self.factors.backward(solved);
+        solved.truncate(self.factors.order());
         let mut condensed = ParameterMatrix::zeros();
-        let mut couplings = [SMatrix::<f64, END_COUPLING, 6>::zeros(); 2];
         for end in 0..2 {
-            let first = if end == 0 { 0 } else { internal - END_COUPLING };
-            couplings[end] = self.coupling(end);
-            let through_clamp = self.end_coupling(end) * ends[end];
-            for (i, row) in solved[first..first + END_COUPLING].iter_mut().enumerate() {
-                for c in 0..6 {
-                    row[6 * end + c] += couplings[end][(i, c)];
-                }
-                for c in 0..PARAMETERS {
-                    row[FIRST_PARAMETER + c] += through_clamp[(i, c)];
-                }
-            }
-            let columns = self.end_columns(end, &explicit, &ends[end]);
-            condensed.fixed_rows_mut::<6>(6 * end).copy_from(&columns);
-        }
-        self.factors.forward(&mut solved, 0);
-        self.factors.backward(&mut solved);
-        solved.truncate(internal);
-        for end in 0..2 {
-            let first = if end == 0 { 0 } else { internal - END_COUPLING };
-            for (i, row) in solved[first..first + END_COUPLING].iter().enumerate() {
+            let coupling = self.coupling(end);
+            let mut rows = self.end_columns(end, &direct.explicit, &direct.ends[end]);
+            for (i, row) in solved[self.coupled_rows(end)].iter().enumerate() {
                 for r in 0..6 {
                     for c in 0..PARAMETERS {
-                        condensed[(6 * end + r, c)] -= couplings[end][(i, r)] * row[FIRST_PARAMETER + c];
+                        rows[(r, c)] -= coupling[(i, r)] * row[first + c];
                     }
                 }
             }
+            condensed.fixed_rows_mut::<6>(6 * end).copy_from(&rows);
         }
-        let slip = self.shear.as_deref().and_then(|shear| {
-            let mut by_force = self.force_parameter_columns(rest, &ends);
-            for (row, g) in solved.iter().zip(&shear.columns[FIRST_INTERNAL..4 * n - 4]) {
+        let slip = self.shear.is_some().then(|| {
+            let mut by_force = self.force_parameter_columns(rest, &direct.ends);
+            for (row, g) in solved.iter().zip(self.force_columns()) {
                 for (k, g) in g.iter().enumerate() {
                     for c in 0..PARAMETERS {
-                        by_force[(k, c)] -= g * row[FIRST_PARAMETER + c];
+                        by_force[(k, c)] -= g * row[first + c];
                     }
                 }
             }
             self.condense_parameters(&mut condensed, &by_force)
         });
-        if let Some(slip) = &slip {
-            through_slip(&mut solved, slip);
-        }
-        let slip = slip.map(Box::new);
-        let columns = self.columns.insert(Box::new(ParameterColumns { condensed, solved, slip, ends }));
-        Ok(&columns.condensed)
+        (condensed, slip.flatten())
     }
 
     /// Condensed columns of the last [`Self::parameter_columns`] for this state.

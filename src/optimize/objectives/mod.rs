@@ -14,7 +14,7 @@ mod track;
 pub use soft_maximum::{Level, Sampled, SoftForm};
 
 use crate::equilibrium::{
-    Equilibrium, Layout, Model, PointForce, PointForceChange, Sensitivity, SensitivityWorkspace,
+    Equilibrium, Layout, Model, PointForce, PointForceChange, Sensitivity, SensitivityWorkspace, State,
 };
 use crate::geometry::SkeletonCapsule;
 use crate::ir::{Design, ObjectiveKind};
@@ -32,8 +32,8 @@ pub struct StateView<'a> {
     pub model: &'a Model<'a>,
     /// The equilibrium.
     pub equilibrium: &'a Equilibrium,
-    /// The equilibria under the load cases that [`build`] asks for.
-    pub loaded: &'a [Equilibrium],
+    /// The states in equilibrium under the load cases that [`build`] asks for.
+    pub loaded: &'a [State],
     /// Index of the state.
     pub state: usize,
     /// Weight of this state in sums over the cycle: 60 / number of counted states.
@@ -46,7 +46,7 @@ pub struct StateView<'a> {
 pub struct StatesSensitivity<'a> {
     /// Of the equilibrium without loads.
     pub free: Sensitivity,
-    /// Of those under each load case.
+    /// Of those under each load case, without what rods do inside.
     pub loaded: Vec<Sensitivity>,
     /// What `free` was computed with last: strains are only worked out for rods that need them.
     pub workspace: &'a SensitivityWorkspace,
@@ -188,14 +188,9 @@ pub fn largest_weight_of_scaled(design: &Design) -> f64 {
 }
 
 /// Derivatives of a trace's place by the n design parameters, 3 × n: as its body moves, and as it moves within.
-fn trace_rows(
-    model: &Model,
-    equilibrium: &Equilibrium,
-    sensitivity: &Sensitivity,
-    index: usize,
-) -> Matrix3xX<f64> {
+fn trace_rows(model: &Model, state: &State, sensitivity: &Sensitivity, index: usize) -> Matrix3xX<f64> {
     let trace = &model.layout.traces[index];
-    let pose = &equilibrium.state.poses[trace.body];
+    let pose = &state.poses[trace.body];
     let mut rows = match model.layout.bodies[trace.body].first_dof {
         // δz = δu + δφ × r
         Some(first) => {

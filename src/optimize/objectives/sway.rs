@@ -47,7 +47,7 @@ impl Sway {
         let free = view.equilibrium.state.poses[trace.body].point(&trace.rest);
         for case in self.cases.clone() {
             if let Some(loaded) = view.loaded.get(case) {
-                f(case, loaded.state.poses[trace.body].point(&trace.rest) - free);
+                f(case, loaded.poses[trace.body].point(&trace.rest) - free);
             }
         }
     }
@@ -65,13 +65,13 @@ impl Objective for Sway {
     }
 
     fn accumulate(&self, view: &StateView, at: &StatesSensitivity, out: &mut Normal) {
-        let rows = |equilibrium, sensitivity| trace_rows(view.model, equilibrium, sensitivity, self.trace);
-        let free = rows(view.equilibrium, &at.free);
+        let rows = |state, sensitivity| trace_rows(view.model, state, sensitivity, self.trace);
+        let free = rows(&view.equilibrium.state, &at.free);
         self.for_each_case(view, |case, displacement| {
-            let (Some(equilibrium), Some(sensitivity)) = (view.loaded.get(case), at.loaded.get(case)) else {
+            let (Some(state), Some(sensitivity)) = (view.loaded.get(case), at.loaded.get(case)) else {
                 return;
             };
-            let relative = rows(equilibrium, sensitivity) - &free;
+            let relative = rows(state, sensitivity) - &free;
             for c in 0..3 {
                 let row: Vec<f64> = relative.row(c).iter().copied().collect();
                 out.add(self.factor * view.share, displacement[c], &row);

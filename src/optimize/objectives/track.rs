@@ -84,7 +84,7 @@ impl Objective for Track {
     fn accumulate(&self, view: &StateView, at: &StatesSensitivity, out: &mut Normal) {
         let (error, along) = self.error_mm(view);
         let weight = self.weight(view);
-        let mut rows = trace_rows(view.model, view.equilibrium, &at.free, self.trace);
+        let mut rows = trace_rows(view.model, &view.equilibrium.state, &at.free, self.trace);
         for change in view.model.layout.changes.iter().flatten() {
             let mut column = rows.column_mut(change.parameter);
             column -= self.target_rate(view, &change.traces[self.trace]);
