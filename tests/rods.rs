@@ -96,7 +96,7 @@ fn hinge(edges: usize) -> Rows {
     for degrees in 1..=60 {
         s.move_b(&Vector3::zeros(), &(Vector3::z() * 1f64.to_radians())).unwrap();
         if degrees % 10 == 0 {
-            let g = s.system.condensed_gradient();
+            let g = s.condensed().0;
             let key = |q: &str| {
                 format!(
                     "hinge_about_midpoint|theta={degrees}deg benchmark flexure (both ends clamped, full length 30 flexible)|{q}"
@@ -174,7 +174,7 @@ fn bend45(edges: usize) -> Rows {
 fn stable(s: &mut SingleRod, p: f64, free: &[usize]) -> bool {
     let load = EndLoad { force: Vector3::x() * -p, point: Vector3::x() * L, ..EndLoad::NONE };
     s.solve(&load, [true, false, false, false, false, false]).unwrap();
-    let h = s.system.condensed_hessian();
+    let h = s.condensed().1;
     let k = DMatrix::from_fn(free.len(), free.len(), |i, j| h[(free[i], free[j])]);
     // Bring forces and moments to one scale.
     let scale = |i: usize| if free[i] % 6 < 3 { L } else { 1.0 };
@@ -439,7 +439,7 @@ fn moment_is_the_slope_of_the_energy_and_path_independent() {
             let turn = Vector3::z() * (degrees / steps as f64).to_radians();
             s.move_b(&Vector3::zeros(), &turn).unwrap();
         }
-        (s.system.energy(), s.system.condensed_gradient()[11], s.state)
+        (s.system.energy(), s.condensed().0[11], s.state)
     };
     let h = 0.05;
     let slope = (8.0 * (at(35, 35.0 + h).0 - at(35, 35.0 - h).0)
@@ -469,7 +469,7 @@ fn short_hinge_agrees_with_shooting() {
             angle += 1;
             s.move_b(&Vector3::zeros(), &(Vector3::z() * 1f64.to_radians())).unwrap();
         }
-        let g = s.system.condensed_gradient();
+        let g = s.condensed().0;
         let strains = s.system.strains(&s.rod);
         // Vertices 50 and 51 straddle the middle; points 0 and 16 are at ±a along m₁ = y.
         let stress = |point| {

@@ -546,7 +546,7 @@ mod tests {
         system.assemble(&rod, &state, &a, &b);
         system.factor();
         system.condense();
-        let columns = *system.parameter_columns(&rod, &a, &b).unwrap();
+        let columns = system.parameter_columns(&rod, &a, &b).unwrap();
         let scale = system.condensed_hessian().amax();
         assert!(columns.amax() < 1e-9 * scale, "{:e} {scale:e}", columns.amax());
         let d = system

@@ -32,7 +32,7 @@ fn parameter_columns_of(options: RodOptions) {
     system.assemble(&sample.rod, &sample.state, &sample.a, &sample.b);
     system.factor_unshifted();
     system.condense();
-    let condensed = *system.parameter_columns(&sample.rod, &sample.a, &sample.b).unwrap();
+    let condensed = system.parameter_columns(&sample.rod, &sample.a, &sample.b).unwrap();
     let n = sample.rod.internal_freedoms();
     let p = -system
         .internal_sensitivity(&DMatrix::zeros(12, PARAMETERS), &DMatrix::identity(PARAMETERS, PARAMETERS))
@@ -125,8 +125,8 @@ fn check(build: impl Fn(&RodParameters) -> SingleRod, free: bool) {
     let q0 = curved();
     let mut s = build(&q0);
     let (pose_a, pose_b) = (s.pose_a, s.pose_b);
-    let h: SMatrix<f64, 12, 12> = *s.system.condensed_hessian();
-    let columns = *s.system.parameter_columns(&s.rod, &pose_a, &pose_b).unwrap();
+    let h: SMatrix<f64, 12, 12> = *s.condensed().1;
+    let columns = s.system.parameter_columns(&s.rod, &pose_a, &pose_b).unwrap();
     let dq = DMatrix::identity(PARAMETERS, PARAMETERS);
     let mut d_link = DMatrix::zeros(12, PARAMETERS);
     if free {

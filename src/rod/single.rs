@@ -97,12 +97,14 @@ pub struct SingleRod {
     pub pose_a: Pose,
     /// Pose of link B.
     pub pose_b: Pose,
-    /// Workspace; after a solve, assembled and condensed at the equilibrium, unshifted.
+    /// Workspace; after a solve, assembled and factored at the equilibrium, unshifted. See [`Self::condensed`].
     pub system: RodSystem,
     /// Factor report at the last equilibrium.
     pub report: Option<FactorReport>,
     /// Whether `system` is that of an equilibrium at `state`.
     solved: bool,
+    /// Whether it is condensed there, too.
+    condensed: bool,
     /// The last movements of link B, the latest first.
     moves: Vec<Move>,
 }
@@ -120,8 +122,17 @@ impl SingleRod {
     pub fn new(rod: Rod, center_a: Vector3<f64>, center_b: Vector3<f64>) -> Self {
         let system = RodSystem::new(&rod);
         let (pose_a, pose_b) = (Pose::rest(center_a), Pose::rest(center_b));
-        let (solved, moves) = (false, Vec::new());
-        Self { state: rod.rest_state(), rod, pose_a, pose_b, system, report: None, solved, moves }
+        let (solved, condensed, moves) = (false, false, Vec::new());
+        Self { state: rod.rest_state(), rod, pose_a, pose_b, system, report: None, solved, condensed, moves }
+    }
+
+    /// What the links exert on the rod (12: forces N, moments N·mm, of A and of B) and their stiffness (12 by 12) at the equilibrium
+    /// last solved, with the rod inside in balance: [`RodSystem::condense`], done when first asked for.
+    pub fn condensed(&mut self) -> (&SVector<f64, 12>, &SMatrix<f64, 12, 12>) {
+        if !std::mem::replace(&mut self.condensed, true) {
+            self.system.condense();
+        }
+        (self.system.condensed_gradient(), self.system.condensed_hessian())
     }
 
     fn assemble(&mut self) {
@@ -192,8 +203,9 @@ impl SingleRod {
         if !self.solved {
             self.assemble();
             self.report = Some(self.system.factor_unshifted());
-            self.system.condense();
+            self.condensed = false;
         }
+        self.condensed();
         let mut d = SVector::<f64, 12>::zeros();
         d.fixed_rows_mut::<3>(6).copy_from(du);
         d.fixed_rows_mut::<3>(9).copy_from(dphi);
@@ -236,7 +248,7 @@ impl SingleRod {
         let mut residual = f64::INFINITY;
         // A state that is an equilibrium already takes no step.
         let mut last_step = 0.0;
-        self.solved = false;
+        (self.solved, self.condensed) = (false, false);
         let length = self.rod.length_mm();
         let unrolls = free[..3] == [true; 3] && self.rod.shear.is_empty();
         let least = LEAST_FORCE * self.rod.least_bending_stiffness() / (length * length);
@@ -260,7 +272,6 @@ impl SingleRod {
                     self.assemble();
                 }
                 self.report = Some(self.system.factor_unshifted());
-                self.system.condense();
                 self.solved = true;
                 return Ok(iteration);
             }
