@@ -132,8 +132,7 @@ impl Solver {
         cases: &[&[PointForce]],
     ) -> Vec<Option<Begun>> {
         self.take_sizes(model, target);
-        let rods = self.assemble_rods(model, from);
-        self.factor_rods(false);
+        let rods = self.assemble_rods(model, from, true);
         let mut begin = |loads: &&[PointForce]| {
             self.take_loads(loads);
             let residual = self.residual(model, from, target, &rods);

@@ -1,6 +1,7 @@
 //! The compliant model at given design parameters: the layout plus one rod per flexure, with the
 //! derivatives of each rod's parameters by the design parameters.
 
+use super::frames::RodEndFrame;
 use super::layout::Layout;
 use crate::ir::{self, Design, Section};
 use crate::math::Pose;
@@ -9,6 +10,7 @@ use crate::rod::{
     SectionShape,
 };
 use nalgebra::{DMatrix, Vector3};
+use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// A rod between two bodies.
@@ -83,8 +85,7 @@ impl<'l> Model<'l> {
         let layout: Cow<'l, Layout> = layout.into();
         let values = design.exprs.evaluate(p);
         let material = RodMaterial { e_mpa: design.material.e_mpa, nu: design.material.nu };
-        let mut rods = Vec::with_capacity(design.rods.len());
-        for (index, (rod, ends)) in design.rods.iter().zip(&layout.rod_ends).enumerate() {
+        let make = |(index, (rod, ends)): (usize, (&ir::Rod, &[RodEndFrame; 2]))| {
             let mut q = [0.0; PARAMETERS];
             let mut dq_dp = DMatrix::zeros(PARAMETERS, p.len());
             for (k, (end, frame)) in [&rod.from, &rod.to].into_iter().zip(ends).enumerate() {
@@ -129,9 +130,12 @@ impl<'l> Model<'l> {
             let q = RodParameters::from_array(&q);
             let built = Rod::with_options(&q, material, edges, options, derivatives)
                 .map_err(|error| ModelError { rod: index, error })?;
-            rods.push(ModelRod { rod: built, bodies: [rod.from.body, rod.to.body], dq_dp });
-        }
-        Ok(Self { layout, rods, p: p.to_vec() })
+            Ok(ModelRod { rod: built, bodies: [rod.from.body, rod.to.body], dq_dp })
+        };
+        let of_text = design.rods.par_iter().zip(&layout.rod_ends).enumerate();
+        // The first that cannot be built is told, whichever thread is first.
+        let rods: Vec<Result<ModelRod, ModelError>> = of_text.map(make).collect();
+        Ok(Self { rods: rods.into_iter().collect::<Result<_, _>>()?, layout, p: p.to_vec() })
     }
 
     /// The unstressed rest state.

@@ -5,9 +5,10 @@ use super::model::{Model, State};
 use super::saddle::{elimination, gather, scatter};
 use crate::ir::DriveUnit;
 use crate::kinematics::Jacobian;
+use crate::math::Pose;
 use crate::math::elimination::Elimination;
 use crate::math::fronts::Factors;
-use crate::rod::{RodSystem, StationStrain};
+use crate::rod::{RodState, RodSystem, StationStrain};
 use nalgebra::DVector;
 use std::sync::Arc;
 
@@ -92,6 +93,21 @@ pub struct Solver {
     pub(super) sizes: Vec<f64>,
 }
 
+/// What is asked of Newton's method.
+#[derive(Clone, Copy)]
+struct Wanted {
+    /// Whether the factors at the state found are needed, too.
+    factors: bool,
+    /// Iterations at most.
+    iterations: usize,
+}
+
+impl Wanted {
+    fn factors(iterations: usize) -> Self {
+        Self { factors: true, iterations }
+    }
+}
+
 /// Where Newton's method begins.
 pub(super) struct Begin {
     pub(super) state: State,
@@ -131,7 +147,7 @@ impl From<Halt> for SolveError {
     }
 }
 
-/// A state in balance, for which the rods are assembled, but nothing is factored yet.
+/// A state in balance, for which the rods are assembled, but links are not factored yet.
 pub(super) struct Settled {
     pub(super) state: State,
     iterations: usize,
@@ -230,8 +246,8 @@ impl Solver {
     ) -> Result<Equilibrium, SolveError> {
         self.take_loads(loads);
         self.take_sizes(model, target);
-        let settled = self.settle(model, state.into(), target, ITERATIONS)?;
-        Ok(self.complete(model, settled, target))
+        let settled = self.settle(model, state.into(), target, Wanted::factors(ITERATIONS))?;
+        Ok(self.complete(model, settled))
     }
 
     /// Goes on to the equilibrium under `loads` from where it was begun.
@@ -247,7 +263,8 @@ impl Solver {
     ) -> Result<State, Halt> {
         self.take_loads(loads);
         self.take_sizes(model, target);
-        Ok(self.settle(model, begin, target, ITERATIONS)?.state)
+        let wanted = Wanted { factors: false, iterations: ITERATIONS };
+        Ok(self.settle(model, begin, target, wanted)?.state)
     }
 
     /// Assembles and factors at an equilibrium found before, which takes no further iteration.
@@ -263,8 +280,8 @@ impl Solver {
     ) -> Result<(), SolveError> {
         self.take_loads(loads);
         self.take_sizes(model, target);
-        let mut settled = self.settle(model, state.clone().into(), target, ITERATIONS)?;
-        self.factor_settled(model, &mut settled, target);
+        let settled = self.settle(model, state.clone().into(), target, Wanted::factors(ITERATIONS))?;
+        self.factor_settled(model, &settled);
         Ok(())
     }
 
@@ -285,12 +302,18 @@ impl Solver {
     ) -> Result<Equilibrium, SolveError> {
         self.loads.clear();
         self.take_sizes(model, target);
-        let settled = self.settle(model, state.into(), target, STEP_ITERATIONS)?;
-        Ok(self.complete(model, settled, target))
+        let settled = self.settle(model, state.into(), target, Wanted::factors(STEP_ITERATIONS))?;
+        Ok(self.complete(model, settled))
     }
 
-    fn settle(&mut self, model: &Model, begin: Begin, target: &[f64], limit: usize) -> Result<Settled, Halt> {
-        let found = self.iterations(model, begin, target, limit);
+    fn settle(
+        &mut self,
+        model: &Model,
+        begin: Begin,
+        target: &[f64],
+        wanted: Wanted,
+    ) -> Result<Settled, Halt> {
+        let found = self.iterations(model, begin, target, wanted);
         if found.is_err() {
             self.systems.iter_mut().for_each(RodSystem::forget_expected);
         }
@@ -302,11 +325,14 @@ impl Solver {
         model: &Model,
         begin: Begin,
         target: &[f64],
-        limit: usize,
+        wanted: Wanted,
     ) -> Result<Settled, Halt> {
         let Begin { mut state, iteration, mut before_n, mut factors_at_hand } = begin;
-        for iterations in iteration..limit {
-            let residual = self.assemble(model, &state, target);
+        for iterations in iteration..wanted.iterations {
+            // Where no step with the former factors can follow, each rod is factored while it is at hand.
+            let factored = before_n.is_none() && wanted.factors;
+            let rods = self.assemble_rods(model, &state, factored);
+            let residual = self.residual(model, &state, target, &rods);
             if !residual.is_finite() {
                 return Err(SolveError::NotFinite.into());
             }
@@ -322,7 +348,10 @@ impl Solver {
                     s.condense_gradient();
                 });
             } else {
-                self.factor(model, &state, false);
+                if !factored {
+                    self.factor_rods(false);
+                }
+                self.factor_links(model, &state, false);
                 factors_at_hand = true;
             }
             let taken = self.step(model, &mut state, target)?;
@@ -347,15 +376,19 @@ impl Solver {
     }
 
     /// Factors at a settled state with its exact Hessian; whether it is a strict minimum.
-    fn factor_settled(&mut self, model: &Model, settled: &mut Settled, target: &[f64]) -> bool {
-        if self.systems.iter().any(|s| !s.is_exact(settled.tolerance_n)) {
-            self.assemble(model, &settled.state, target);
+    fn factor_settled(&mut self, model: &Model, settled: &Settled) -> bool {
+        let exact = self.systems.iter().all(|s| s.is_exact(settled.tolerance_n));
+        if !exact {
+            self.assemble_rods(model, &settled.state, true);
         }
-        self.factor(model, &settled.state, true)
+        if !self.systems.iter().all(RodSystem::is_factored) {
+            self.factor_rods(true);
+        }
+        self.factor_links(model, &settled.state, true)
     }
 
-    fn complete(&mut self, model: &Model, mut settled: Settled, target: &[f64]) -> Equilibrium {
-        let stable = self.factor_settled(model, &mut settled, target);
+    fn complete(&mut self, model: &Model, settled: Settled) -> Equilibrium {
+        let stable = self.factor_settled(model, &settled);
         let Settled { state, iterations, .. } = settled;
         let energy_n_mm = self.systems.iter().map(|s| s.energy()).sum();
         let strains = model.rods.iter().zip(&self.systems).map(|(r, s)| s.strains(&r.rod)).collect();
@@ -363,13 +396,12 @@ impl Solver {
         Equilibrium { state, stable, energy_n_mm, load_potential_n_mm, strains, iterations }
     }
 
-    /// Assembles all rods and measures the residual.
-    fn assemble(&mut self, model: &Model, state: &State, target: &[f64]) -> Residual {
-        let rods = self.assemble_rods(model, state);
-        self.residual(model, state, target, &rods)
-    }
-
-    pub(super) fn assemble_rods(&mut self, model: &Model, state: &State) -> AssembledRods {
+    /// Assembles all rods; `factored` also factors and condenses each while its numbers are at hand.
+    pub(super) fn assemble_rods(&mut self, model: &Model, state: &State, factored: bool) -> AssembledRods {
+        if factored {
+            self.rods_positive = true;
+            self.rods_factored += 1;
+        }
         let mut gradient = DVector::zeros(model.layout.dofs());
         let (mut internal_n, mut largest, mut least_stiffness, mut floor) =
             (0.0f64, 0.0f64, f64::MAX, 0.0f64);
@@ -382,6 +414,10 @@ impl Solver {
                 least_stiffness.min(rod.rod.least_bending_stiffness() / rod.rod.length_mm().powi(2));
             floor = floor.max(system.rounding_floor(&rod.rod, rod_state));
             scatter(model, rod.bodies, system.link_gradient(), &mut gradient);
+            if factored {
+                self.rods_positive &= system.factor().negative_pivots == 0;
+                system.condense();
+            }
         }
         let tolerance_n = RESIDUAL * largest.max(1e-3 * least_stiffness) + floor;
         AssembledRods { gradient, internal_n, tolerance_n }
@@ -454,22 +490,22 @@ impl Solver {
         model: &Model,
         state: &mut State,
         step: &DVector<f64>,
-        fraction: f64,
+        mut fraction: f64,
     ) -> Result<f64, SolveError> {
-        let inside: Vec<Vec<f64>> = model
-            .rods
-            .iter()
-            .zip(&mut self.systems)
-            .map(|(rod, system)| system.back_substitute(&gather(model, rod.bodies, step)).to_vec())
-            .collect();
-        let mut fraction = fraction;
         // A frame that would turn by more than a right angle leaves the branch of its twist: shorten.
         for _ in 0..8 {
-            if let Some(next) = moved(model, state, step, &inside, fraction) {
+            let systems = &mut self.systems;
+            let follow = |r: usize, rod_state: &mut RodState, poses: &[Pose]| {
+                let (rod, system) = (model.rods.get(r)?, systems.get_mut(r)?);
+                let inside = system.back_substitute(&gather(model, rod.bodies, step));
+                let scaled: Vec<f64> = inside.iter().map(|v| v * fraction).collect();
+                let [a, b] = rod.bodies;
+                rod.rod.retract(rod_state, &scaled, &poses[a], &poses[b]).ok()?;
+                system.expect(&rod.rod, fraction);
+                Some(())
+            };
+            if let Some(next) = moved(model, state, step, fraction, follow) {
                 *state = next;
-                for (rod, system) in model.rods.iter().zip(&mut self.systems) {
-                    system.expect(&rod.rod, fraction);
-                }
                 return Ok(fraction);
             }
             fraction *= 0.5;
@@ -478,14 +514,14 @@ impl Solver {
     }
 }
 
-/// The state moved by a fraction of increments of links and multipliers (`step`) and of each rod's inside; none where a
-/// rod cannot follow.
+/// The state moved by a fraction of increments of links and multipliers (`step`), while `follow` moves each rod's state to
+/// the links' new poses; none where a rod cannot follow.
 pub(super) fn moved(
     model: &Model,
     state: &State,
     step: &DVector<f64>,
-    inside: &[Vec<f64>],
     fraction: f64,
+    mut follow: impl FnMut(usize, &mut RodState, &[Pose]) -> Option<()>,
 ) -> Option<State> {
     let n = model.layout.dofs();
     let mut next = state.clone();
@@ -495,12 +531,8 @@ pub(super) fn moved(
             *pose = pose.retract(&d.fixed_rows::<3>(0).into(), &d.fixed_rows::<3>(3).into());
         }
     }
-    let mut scaled = Vec::new();
-    for ((rod, internal), rod_state) in model.rods.iter().zip(inside).zip(&mut next.rods) {
-        scaled.clear();
-        scaled.extend(internal.iter().map(|v| v * fraction));
-        let [a, b] = rod.bodies;
-        rod.rod.retract(rod_state, &scaled, &next.poses[a], &next.poses[b]).ok()?;
+    for (r, rod_state) in next.rods.iter_mut().enumerate() {
+        follow(r, rod_state, &next.poses)?;
     }
     for (l, d) in next.lambda.iter_mut().zip(step.rows(n, model.rows()).iter()) {
         *l += fraction * d;

@@ -8,7 +8,8 @@
 use super::model::{Model, State};
 use super::newton::{Equilibrium, Solver, moved};
 use super::saddle::gather;
-use crate::rod::RodForces;
+use crate::math::Pose;
+use crate::rod::{RodForces, RodState};
 use nalgebra::{DVector, Matrix4, Vector4};
 
 /// States whose tangents are used at most.
@@ -128,7 +129,12 @@ impl History {
             }
         }
         let sum = sum?;
-        let next = moved(model, state, &sum.links, &sum.inside, 1.0)?;
+        let follow = |r: usize, rod_state: &mut RodState, poses: &[Pose]| {
+            let rod = model.rods.get(r)?;
+            let [a, b] = rod.bodies;
+            rod.rod.retract(rod_state, sum.inside.get(r)?, &poses[a], &poses[b]).ok()
+        };
+        let next = moved(model, state, &sum.links, 1.0, follow)?;
         for ((system, now), change) in solver.systems.iter_mut().zip(&latest.forces).zip(&sum.forces) {
             let mut forces = now.clone();
             forces.add_scaled(1.0, change);

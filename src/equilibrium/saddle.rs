@@ -53,14 +53,6 @@ impl Solver {
         }
     }
 
-    /// Condenses the rods and factors the scaled saddle-point matrix. With `exact` nothing is
-    /// shifted, and the answer says whether the state is a strict minimum; otherwise rods and links
-    /// are shifted until the step is one of descent.
-    pub(super) fn factor(&mut self, model: &Model, state: &State, exact: bool) -> bool {
-        self.factor_rods(exact);
-        self.factor_links(model, state, exact)
-    }
-
     /// Factors and condenses the rods as assembled.
     pub(super) fn factor_rods(&mut self, exact: bool) {
         self.rods_positive = true;
@@ -72,7 +64,9 @@ impl Solver {
         }
     }
 
-    /// The rest of [`Self::factor`], with rods condensed.
+    /// Factors the scaled saddle-point matrix of condensed rods. With `exact` nothing is
+    /// shifted, and the answer says whether the state is a strict minimum; otherwise rods and links
+    /// are shifted until the step is one of descent.
     pub(super) fn factor_links(&mut self, model: &Model, state: &State, exact: bool) -> bool {
         let n = model.layout.dofs();
         let m = model.rows();

@@ -1,6 +1,10 @@
 //! Normal equations of a weighted sum of squares: what Gauss–Newton and gradient methods both need.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Columns of a matrix that are summed by one thread at a time, at least.
+const COLUMNS: usize = 8;
 
 /// f = ½ Σ w r², its gradient Σ w r ∇r and its Gauss–Newton matrix Σ w ∇r ∇rᵀ, for n parameters.
 #[derive(Clone, Debug, PartialEq)]
@@ -74,8 +78,54 @@ impl Normal {
         self.gauss_newton += &other.gauss_newton;
     }
 
+    /// Sum of several of n parameters, each number in their order, on any number of threads: the same bits as one after another.
+    pub fn sum(n: usize, parts: &[&Self]) -> Self {
+        let mut out = Self::new(n);
+        for part in parts {
+            out.cost += part.cost;
+            out.gradient += &part.gradient;
+            out.tilt += &part.tilt;
+        }
+        let columns = out.gauss_newton.as_mut_slice().par_chunks_mut(n.max(1)).enumerate();
+        // A column is a short piece of work.
+        columns.with_min_len(COLUMNS).for_each(|(j, column)| {
+            let below = j * n + j..(j + 1) * n;
+            for part in parts {
+                let more = part.gauss_newton.as_slice().get(below.clone()).unwrap_or_default();
+                column.iter_mut().skip(j).zip(more).for_each(|(to, from)| *to += from);
+            }
+        });
+        out
+    }
+
     /// Mirrors the lower triangle.
     pub fn complete(&mut self) {
         self.gauss_newton.fill_upper_triangle_with_lower_triangle();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sum_has_the_bits_of_one_after_another() {
+        let n = 37;
+        let value = |k: usize| ((k * 2_654_435_761) % 1_000_003) as f64 / 7919.0 - 50.0;
+        let part = |k: usize| {
+            let mut part = Normal::new(n);
+            for r in 0..3 {
+                let row: Vec<f64> = (0..n).map(|j| value(1000 * k + 100 * r + j)).collect();
+                part.add(value(k + r).abs(), value(k * r + 7), &row);
+                part.add_tilt(value(k), &row);
+            }
+            part
+        };
+        let parts: Vec<Normal> = (0..20).map(part).collect();
+        let mut one_by_one = Normal::new(n);
+        parts.iter().for_each(|p| one_by_one.merge(p));
+        assert!(one_by_one.gauss_newton[(n - 1, 0)] != 0.0);
+        assert_eq!(Normal::sum(n, &parts.iter().collect::<Vec<_>>()), one_by_one);
+        assert_eq!(Normal::sum(n, &[]), Normal::new(n));
     }
 }

@@ -343,15 +343,11 @@ impl<'d> Problem<'d> {
                 },
             )
             .collect();
+        let parts = parts.into_iter().collect::<Option<Vec<_>>>()?;
         // All sums together first, then each soft maximum.
-        let mut totals: Vec<Normal> = Vec::new();
-        for part in parts {
-            let part = part?;
-            totals.resize_with(part.len(), || Normal::new(n));
-            for (total, part) in totals.iter_mut().zip(&part) {
-                total.merge(part);
-            }
-        }
+        let kinds = parts.first().map_or(0, Vec::len);
+        let of_kind = |k: usize| parts.iter().filter_map(|p| p.get(k)).collect::<Vec<_>>();
+        let totals: Vec<Normal> = (0..kinds).map(|k| Normal::sum(n, &of_kind(k))).collect();
         let mut totals = totals.into_iter();
         let mut sum = totals.next()?;
         let peaks = self.objectives.iter().zip(&trial.levels).filter_map(|(o, level)| match (o, level) {

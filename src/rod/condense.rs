@@ -60,6 +60,11 @@ impl RodSystem {
         self.factor_shear(report, false)
     }
 
+    /// Whether the factors at hand are those of the Hessian last assembled, not shifted.
+    pub fn is_factored(&self) -> bool {
+        self.factored == Some(0.0)
+    }
+
     fn factor_band(&mut self) -> FactorReport {
         let negative = self.factors.factor(&self.band[FIRST_INTERNAL..4 * self.n - 4], |_| 0.0);
         self.factored = Some(0.0);

@@ -139,7 +139,7 @@ impl RodSystem {
         rest: &RestShape<Dual<PARAMETERS>>,
         poses: [&Pose; 2],
     ) -> DirectColumns {
-        if self.factored != Some(0.0) {
+        if !self.is_factored() {
             self.factor_unshifted();
             self.condense();
         }
