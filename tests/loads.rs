@@ -138,3 +138,33 @@ fn the_loaded_state_does_not_depend_on_the_way() {
         assert!((fixture.tip(&once) - fixture.tip(&two)).norm() < 1e-7, "forces add up");
     });
 }
+
+/// Loads taken together share the rods of their first step, and end in the bits of each by itself: near enough for a step with
+/// the former factors, further, in parts only, and none at all.
+#[test]
+fn loads_taken_together_end_where_each_does() {
+    let fixture = Fixture::new();
+    fixture.with(|model, free, target| {
+        let sizes = [1e-4, 0.3, 1.0, 0.0, 2e-4, 30.0];
+        let loads = sizes.map(|k| [fixture.force(Vector3::new(-0.3, 0.9, 0.4) * k)]);
+        let one_by_one: Vec<_> = loads
+            .iter()
+            .map(|load| Solver::new(model).load(model, free, target, load).map(|e| e.state.poses))
+            .collect();
+        assert!(one_by_one[..5].iter().all(Result::is_ok));
+        let mut solver = Solver::new(model);
+        let together = |solver: &mut Solver, n: usize| {
+            let cases: Vec<&[PointForce]> = loads[..n].iter().map(|l| &l[..]).collect();
+            solver
+                .load_each(model, free, target, &cases)
+                .map(|s| s.into_iter().map(|s| s.poses).collect::<Vec<_>>())
+        };
+        for _ in 0..2 {
+            let found = together(&mut solver, 5).unwrap();
+            for ((found, one), size) in found.iter().zip(&one_by_one).zip(sizes) {
+                assert_eq!(Ok(found), one.as_ref(), "{size} N");
+            }
+        }
+        assert_eq!(together(&mut solver, 6).is_ok(), one_by_one[5].is_ok());
+    });
+}

@@ -1,37 +1,21 @@
 //! Newton's method on the total potential with constraints, full steps first.
 
-use super::load::{PointForce, scatter_loads};
+use super::load::PointForce;
 use super::model::{Model, State};
-use super::saddle::{elimination, gather, scatter};
+use super::saddle::elimination;
 use crate::ir::DriveUnit;
 use crate::kinematics::Jacobian;
-use crate::math::Pose;
 use crate::math::elimination::Elimination;
 use crate::math::fronts::Factors;
-use crate::rod::{RodState, RodSystem, StationStrain};
+use crate::rod::{RodSystem, StationStrain};
 use nalgebra::DVector;
 use std::sync::Arc;
 
-/// Relative residual of an accepted state, against the largest internal force F*. Tight enough for derivatives that agree
-/// with differences to 1e-6 (`tests/equilibrium.rs`), above the rounding floor that is added to it.
-const RESIDUAL: f64 = 1e-9;
-/// Constraints of an accepted state, mm (levers times radians for directions and angles).
-const CONSTRAINT_MM: f64 = 1e-9;
 /// Newton iterations before a solution counts as failed.
 const ITERATIONS: usize = 40;
 /// The same of a step of a sweep, which can be cut: small ones take 1 to 3, steps of 30 degrees up to 5. What takes longer
 /// may have wandered off to another branch.
 const STEP_ITERATIONS: usize = 10;
-/// Largest rotation of a link in one iteration, rad: beyond it the chart's linearisation is poor.
-const ROTATION_STEP_RAD: f64 = 0.4;
-/// Largest displacement of a link in one iteration, in lever lengths.
-const TRANSLATION_STEP: f64 = 0.5;
-
-/// After a full step the Hessian is that of a state so near that a step with its factors leaves about 2 r₁²/r₀ of residuals r₀ and r₁ before and
-/// after it. It is taken where that is below this part of the tolerance. Over the cycles of the examples, at start and solved, 0.01, 0.1 and 0.5 replace
-/// 5 to 43, 10 to 46 and 12 to 48 % of the factorisations of steps, and take the same number of steps in all, but for one.
-const CHORD: f64 = 0.1;
-
 /// Why no equilibrium was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SolveError {
@@ -152,36 +136,6 @@ pub(super) struct Settled {
     pub(super) state: State,
     iterations: usize,
     tolerance_n: f64,
-}
-
-/// What all rods together add to a residual.
-pub(super) struct AssembledRods {
-    gradient: DVector<f64>,
-    internal_n: f64,
-    tolerance_n: f64,
-}
-
-/// Sizes of what is not yet in balance.
-pub(super) struct Residual {
-    pub(super) force_n: f64,
-    constraint_mm: f64,
-    tolerance_n: f64,
-}
-
-impl Residual {
-    pub(super) fn small(&self) -> bool {
-        self.force_n <= self.tolerance_n && self.constraint_mm <= CONSTRAINT_MM
-    }
-
-    pub(super) fn is_finite(&self) -> bool {
-        self.force_n.is_finite() && self.constraint_mm.is_finite()
-    }
-
-    /// Whether one more step with the same factors does, after a full one that brought the force down from `before_n`.
-    fn serves_a_chord(&self, before_n: f64) -> bool {
-        let left_n = 2.0 * self.force_n.powi(2) / before_n;
-        left_n <= CHORD * self.tolerance_n && self.constraint_mm <= CONSTRAINT_MM
-    }
 }
 
 impl Solver {
@@ -360,21 +314,6 @@ impl Solver {
         Err(SolveError::NotConverged.into())
     }
 
-    /// Newton's step with the factors at hand, shortened where a link or rod would move too far; by which fraction.
-    pub(super) fn step(
-        &mut self,
-        model: &Model,
-        state: &mut State,
-        target: &[f64],
-    ) -> Result<f64, SolveError> {
-        let step = self.newton_step(model, state, target);
-        if step.iter().any(|v| !v.is_finite()) {
-            return Err(SolveError::NotFinite);
-        }
-        let fraction = step_fraction(model, &step);
-        self.advance(model, state, &step, fraction)
-    }
-
     /// Factors at a settled state with its exact Hessian; whether it is a strict minimum.
     fn factor_settled(&mut self, model: &Model, settled: &Settled) -> bool {
         let exact = self.systems.iter().all(|s| s.is_exact(settled.tolerance_n));
@@ -395,166 +334,4 @@ impl Solver {
         let load_potential_n_mm = model.load_potential_n_mm(&state, &self.sizes);
         Equilibrium { state, stable, energy_n_mm, load_potential_n_mm, strains, iterations }
     }
-
-    /// Assembles all rods; `factored` also factors and condenses each while its numbers are at hand.
-    pub(super) fn assemble_rods(&mut self, model: &Model, state: &State, factored: bool) -> AssembledRods {
-        if factored {
-            self.rods_positive = true;
-            self.rods_factored += 1;
-        }
-        let mut gradient = DVector::zeros(model.layout.dofs());
-        let (mut internal_n, mut largest, mut least_stiffness, mut floor) =
-            (0.0f64, 0.0f64, f64::MAX, 0.0f64);
-        for ((rod, system), rod_state) in model.rods.iter().zip(&mut self.systems).zip(&state.rods) {
-            let [a, b] = rod.bodies;
-            system.assemble(&rod.rod, rod_state, &state.poses[a], &state.poses[b]);
-            internal_n = internal_n.max(system.internal_residual_norm());
-            largest = largest.max(system.largest_internal_force());
-            least_stiffness =
-                least_stiffness.min(rod.rod.least_bending_stiffness() / rod.rod.length_mm().powi(2));
-            floor = floor.max(system.rounding_floor(&rod.rod, rod_state));
-            scatter(model, rod.bodies, system.link_gradient(), &mut gradient);
-            if factored {
-                self.rods_positive &= system.factor().negative_pivots == 0;
-                system.condense();
-            }
-        }
-        let tolerance_n = RESIDUAL * largest.max(1e-3 * least_stiffness) + floor;
-        AssembledRods { gradient, internal_n, tolerance_n }
-    }
-
-    /// The residual of assembled rods with constraints, drives and the present loads.
-    pub(super) fn residual(
-        &mut self,
-        model: &Model,
-        state: &State,
-        target: &[f64],
-        rods: &AssembledRods,
-    ) -> Residual {
-        let mut gradient = rods.gradient.clone();
-        let mut constraint_mm = 0.0f64;
-        self.for_each_row(model, state, target, |_, bodies, lambda, residual, weight, row| {
-            constraint_mm = constraint_mm.max((residual * weight).abs());
-            scatter(model, bodies, &(row * lambda), &mut gradient);
-        });
-        scatter_loads(model, state, &self.loads, |first, g| {
-            let mut rows = gradient.fixed_rows_mut::<6>(first);
-            rows += g;
-        });
-        self.add_load_gradient(model, state, &mut gradient);
-        let mut force_n = rods.internal_n;
-        for i in 0..gradient.len() {
-            force_n = force_n.max((gradient[i] * self.scale[i]).abs());
-        }
-        Residual { force_n, constraint_mm, tolerance_n: rods.tolerance_n }
-    }
-
-    /// Right-hand side of the scaled system for a full Newton step, and its solution: link
-    /// increments, then the change of the multipliers.
-    fn newton_step(&mut self, model: &Model, state: &State, target: &[f64]) -> DVector<f64> {
-        let n = model.layout.dofs();
-        let mut rhs = DVector::zeros(n + model.rows());
-        let mut gradient = DVector::zeros(n);
-        for (rod, system) in model.rods.iter().zip(&self.systems) {
-            scatter(model, rod.bodies, &system.condensed_gradient, &mut gradient);
-        }
-        self.for_each_row(model, state, target, |row, bodies, lambda, residual, _, row_gradient| {
-            scatter(model, bodies, &(row_gradient * lambda), &mut gradient);
-            rhs[n + row] = -residual;
-        });
-        scatter_loads(model, state, &self.loads, |first, g| {
-            let mut rows = gradient.fixed_rows_mut::<6>(first);
-            rows += g;
-        });
-        self.add_load_gradient(model, state, &mut gradient);
-        for i in 0..n {
-            rhs[i] = -gradient[i];
-        }
-        self.solve_scaled(&mut rhs);
-        rhs
-    }
-
-    /// Derivative of links and multipliers by drive value `drive` at the last solved state.
-    pub(super) fn drive_tangent(&self, model: &Model, drive: usize) -> DVector<f64> {
-        let n = model.layout.dofs();
-        let m = model.rows();
-        let mut rhs = DVector::zeros(n + m);
-        rhs[n + m - model.layout.drives.len() + drive] = 1.0;
-        self.solve_scaled(&mut rhs);
-        rhs
-    }
-
-    /// Moves the state along `step` (links, multipliers) with the rods following; by which fraction.
-    fn advance(
-        &mut self,
-        model: &Model,
-        state: &mut State,
-        step: &DVector<f64>,
-        mut fraction: f64,
-    ) -> Result<f64, SolveError> {
-        // A frame that would turn by more than a right angle leaves the branch of its twist: shorten.
-        for _ in 0..8 {
-            let systems = &mut self.systems;
-            let follow = |r: usize, rod_state: &mut RodState, poses: &[Pose]| {
-                let (rod, system) = (model.rods.get(r)?, systems.get_mut(r)?);
-                let inside = system.back_substitute(&gather(model, rod.bodies, step));
-                let scaled: Vec<f64> = inside.iter().map(|v| v * fraction).collect();
-                let [a, b] = rod.bodies;
-                rod.rod.retract(rod_state, &scaled, &poses[a], &poses[b]).ok()?;
-                system.expect(&rod.rod, fraction);
-                Some(())
-            };
-            if let Some(next) = moved(model, state, step, fraction, follow) {
-                *state = next;
-                return Ok(fraction);
-            }
-            fraction *= 0.5;
-        }
-        Err(SolveError::NotConverged)
-    }
-}
-
-/// The state moved by a fraction of increments of links and multipliers (`step`), while `follow` moves each rod's state to
-/// the links' new poses; none where a rod cannot follow.
-pub(super) fn moved(
-    model: &Model,
-    state: &State,
-    step: &DVector<f64>,
-    fraction: f64,
-    mut follow: impl FnMut(usize, &mut RodState, &[Pose]) -> Option<()>,
-) -> Option<State> {
-    let n = model.layout.dofs();
-    let mut next = state.clone();
-    for (pose, body) in next.poses.iter_mut().zip(&model.layout.bodies) {
-        if let Some(first) = body.first_dof {
-            let d = step.fixed_rows::<6>(first) * fraction;
-            *pose = pose.retract(&d.fixed_rows::<3>(0).into(), &d.fixed_rows::<3>(3).into());
-        }
-    }
-    for (r, rod_state) in next.rods.iter_mut().enumerate() {
-        follow(r, rod_state, &next.poses)?;
-    }
-    for (l, d) in next.lambda.iter_mut().zip(step.rows(n, model.rows()).iter()) {
-        *l += fraction * d;
-    }
-    for (value, drive) in next.drives.iter_mut().zip(&model.layout.drives) {
-        *value = drive.joint.value(&next.poses, *value);
-    }
-    for (turn, load) in next.turns.iter_mut().zip(&model.layout.loads) {
-        *turn = load.turn(&next.poses, *turn);
-    }
-    Some(next)
-}
-
-fn step_fraction(model: &Model, step: &DVector<f64>) -> f64 {
-    let mut fraction = 1.0f64;
-    for body in &model.layout.bodies {
-        if let Some(first) = body.first_dof {
-            let du = step.fixed_rows::<3>(first).norm();
-            let dphi = step.fixed_rows::<3>(first + 3).norm();
-            fraction = fraction.min(TRANSLATION_STEP * model.layout.length_mm / du.max(f64::MIN_POSITIVE));
-            fraction = fraction.min(ROTATION_STEP_RAD / dphi.max(f64::MIN_POSITIVE));
-        }
-    }
-    fraction
 }

@@ -6,8 +6,9 @@
 //! exact up to commutators of third order.
 
 use super::model::{Model, State};
-use super::newton::{Equilibrium, Solver, moved};
+use super::newton::{Equilibrium, Solver};
 use super::saddle::gather;
+use super::step::moved;
 use crate::math::Pose;
 use crate::rod::{RodForces, RodState};
 use nalgebra::{DVector, Matrix4, Vector4};

@@ -33,6 +33,11 @@ fn parameter_columns_of(options: RodOptions) {
     system.factor_unshifted();
     system.condense();
     let condensed = system.parameter_columns(&sample.rod, &sample.a, &sample.b).unwrap();
+    assert_eq!(
+        system.links_parameter_columns(&sample.rod, &sample.a, &sample.b),
+        Ok(condensed),
+        "{options:?}"
+    );
     let n = sample.rod.internal_freedoms();
     let p = -system
         .internal_sensitivity(&DMatrix::zeros(12, PARAMETERS), &DMatrix::identity(PARAMETERS, PARAMETERS))
