@@ -184,6 +184,7 @@ fn a_lock_outlives_a_solid_unless_it_is_weighed() {
     let fit = "solid \"block.stl\" on rocker at P";
     let digest = |fit: &str, size: f64| design_digest(&design(fit, [size; 3]));
     assert_eq!(digest(fit, 5.0), digest("", 5.0));
+    assert_eq!(digest("solid \"block.stl\" on rocker at P + (0.3 mm, 0.7 mm, 0 mm)", 5.0), digest("", 5.0));
     let heavy = format!("{fit}\n    load gravity (0, -1, 0)");
     assert_ne!(digest(&heavy, 5.0), digest(&heavy, 6.0));
     let apart = |fit: &str| {

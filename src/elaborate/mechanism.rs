@@ -2,7 +2,6 @@
 
 use super::codes;
 use super::eval::Evaluator;
-use super::graph;
 use super::sheet::Sheet;
 use super::structure::Structure;
 use super::template::Site;
@@ -10,7 +9,7 @@ use super::terms::Named;
 use super::value::ItemRef;
 use crate::diagnostic::{Diagnostic, Origin, SourceMap};
 use crate::ir::expr::ExprId;
-use crate::ir::{Design, Drive, LoadKind, Process, Realization, Rod, Section};
+use crate::ir::{Design, Drive, Process, Realization, Rod};
 use crate::syntax::ast::Mechanism;
 use std::collections::BTreeMap;
 
@@ -195,10 +194,8 @@ impl<'a> Evaluator<'a> {
 
     /// Drops what the design does not use from the graph, and checks what is left at the start values.
     fn finish(&mut self, design: &mut Design) -> Option<()> {
-        let mut roots = Vec::new();
-        each_expr(design, &mut |id| roots.push(*id));
-        let (exprs, place) = graph::prune(&self.exprs, &roots);
-        let used = self.exprs.free_variables(&roots);
+        design.exprs = self.exprs.clone();
+        let used = design.drop_unused();
         for (i, f) in design.free.iter().enumerate() {
             if !used.contains(&i) {
                 self.out.push(
@@ -211,12 +208,6 @@ impl<'a> Evaluator<'a> {
                 );
             }
         }
-        design.exprs = exprs;
-        each_expr(design, &mut |id| {
-            if let Some(Some(moved)) = place.get(id.0 as usize) {
-                *id = *moved;
-            }
-        });
         let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
         let values = design.exprs.values(&start);
         for rod in &design.rods {
@@ -251,46 +242,4 @@ pub(super) fn quote(sources: &SourceMap, at: Origin) -> String {
     let text =
         sources.files.get(at.file as usize).and_then(|f| f.text.get(at.start as usize..at.end as usize));
     text.unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-/// Visits every expression of a design.
-fn each_expr(design: &mut Design, f: &mut impl FnMut(&mut ExprId)) {
-    for b in &mut design.bodies {
-        b.skeleton.iter_mut().flat_map(|p| &mut p.position).for_each(&mut *f);
-        b.holes.iter_mut().flat_map(|h| &mut h.position).for_each(&mut *f);
-        let mounts = b.fittings.mounts.iter_mut();
-        mounts.flat_map(|m| m.position.iter_mut().chain(m.toward.iter_mut().flatten())).for_each(&mut *f);
-        b.fittings.solids.iter_mut().flat_map(|s| &mut s.position).for_each(&mut *f);
-    }
-    for j in &mut design.joints {
-        j.point.iter_mut().for_each(&mut *f);
-        j.toward.iter_mut().flat_map(|(_, p)| p).for_each(&mut *f);
-    }
-    for r in &mut design.rods {
-        for end in [&mut r.from, &mut r.to] {
-            end.position.iter_mut().for_each(&mut *f);
-            end.derivative.iter_mut().for_each(&mut *f);
-        }
-        for section in std::iter::once(&mut r.section).chain(&mut r.section_to) {
-            match section {
-                Section::Ellipse { a, b } | Section::Rect { a, b } => {
-                    f(a);
-                    f(b);
-                }
-                Section::Round { r } => f(r),
-            }
-        }
-    }
-    for t in &mut design.traces {
-        t.point.iter_mut().for_each(&mut *f);
-    }
-    design.drives.iter_mut().filter_map(|d| d.free_rest.as_mut()).for_each(&mut *f);
-    for c in &mut design.strings {
-        c.point.iter_mut().chain(c.via.iter_mut().flatten()).for_each(&mut *f);
-    }
-    for load in design.loads.iter_mut().chain(design.cases.iter_mut().flat_map(|c| &mut c.loads)) {
-        if let LoadKind::Force { point, .. } = &mut load.kind {
-            point.iter_mut().for_each(&mut *f);
-        }
-    }
 }

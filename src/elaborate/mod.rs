@@ -19,7 +19,6 @@ mod free;
 mod functions;
 mod given;
 mod goals;
-mod graph;
 mod holes;
 mod instances;
 mod known;

@@ -3,9 +3,9 @@
 use super::codes;
 use super::dimension::Dimension;
 use super::eval::{Env, Evaluator, Failed, Outcome};
-use super::graph;
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::ir::expr::{ExprGraph, ExprId, Node};
+use crate::ir::prune;
 use crate::ir::{DriveUnit, Profile};
 use crate::syntax::ast::{self, Expr};
 
@@ -97,7 +97,7 @@ impl<'a> Evaluator<'a> {
                 None => d,
             });
         }
-        let (mut own, place) = graph::prune(&self.exprs, &value);
+        let (mut own, place) = prune(&self.exprs, &value);
         for node in &mut own.nodes {
             if let Node::Free(i) = node {
                 *i = 0;

@@ -11,6 +11,7 @@ mod load;
 mod model;
 mod solid;
 mod solution;
+mod used;
 
 pub use crate::diagnostic::Origin;
 pub use aim::{Aims, BodyAngle, Direction, Target, TargetOf, TargetPath};
@@ -24,6 +25,7 @@ pub use model::RodModel;
 use serde::{Deserialize, Serialize};
 pub use solid::{AddedSolid, SurfaceFault, SurfaceFaultKind, TriangleMesh};
 pub use solution::Solution;
+pub(crate) use used::prune;
 
 /// Index into [`Design::bodies`].
 pub type BodyId = usize;

@@ -14,7 +14,7 @@
 //! ```
 
 use crate::diagnostic::{Diagnostic, Origin};
-use crate::ir::{Design, LoadKind, ObjectiveKind, Solution};
+use crate::ir::{Design, Fittings, LoadKind, ObjectiveKind, Solution};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -140,28 +140,29 @@ impl Lock {
 /// Digest of all of a design that can change what is solved: not of comments, places, exports,
 /// requirements or the printer. Stable under the order in which fields are declared.
 pub fn design_digest(design: &Design) -> String {
-    let mut value = match serde_json::to_value(design) {
+    let mut design = design.clone();
+    // Motors, plates and holes change the form of links; only weight and what keeps links apart ask for that.
+    let apart = design.all_objectives().any(|o| matches!(o.kind, ObjectiveKind::Collision { .. }));
+    let weighed = design.all_loads().any(|l| matches!(l.kind, LoadKind::Gravity { .. }));
+    if !weighed {
+        for body in &mut design.bodies {
+            // What keeps links apart sees primitives only.
+            body.fittings.solids.clear();
+            if !apart {
+                body.fittings = Fittings::default();
+                body.holes.clear();
+            }
+        }
+    }
+    // Nor do the places of what is left out count.
+    design.drop_unused();
+    let mut value = match serde_json::to_value(&design) {
         Ok(value) => value,
         // Plain data of numbers, strings and lists always serialises; this key matches no lock.
         Err(e) => Value::String(e.to_string()),
     };
     if let Value::Object(fields) = &mut value {
         fields.remove("exports");
-        // Motors and plates change the form of links; only weight and what keeps links apart ask for that.
-        let apart = design.all_objectives().any(|o| matches!(o.kind, ObjectiveKind::Collision { .. }));
-        let weighed = design.all_loads().any(|l| matches!(l.kind, LoadKind::Gravity { .. }));
-        if !weighed {
-            for body in fields.get_mut("bodies").and_then(Value::as_array_mut).into_iter().flatten() {
-                let Value::Object(body) = body else { continue };
-                // What keeps links apart sees primitives only.
-                if let Some(Value::Object(fittings)) = body.get_mut("fittings") {
-                    fittings.remove("solids");
-                    if !apart || fittings.is_empty() {
-                        body.remove("fittings");
-                    }
-                }
-            }
-        }
         // Where fillets begin follows the rod, not the other way round.
         for rod in fields.get_mut("rods").and_then(Value::as_array_mut).into_iter().flatten() {
             if let Value::Object(rod) = rod {
