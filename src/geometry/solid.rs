@@ -7,7 +7,7 @@ use super::link::BodyPlan;
 use super::mesh::Mesh;
 use super::slot::Slot;
 use crate::diagnostic::Origin;
-use crate::ir::{Placement, SurfaceFault, SurfaceFaultKind, TriangleMesh};
+use crate::ir::{AddedSolid, ExprPoint, Placement, SurfaceFault, SurfaceFaultKind, TriangleMesh};
 use crate::math::Pose;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
@@ -40,6 +40,22 @@ pub struct PlacedSolid {
 }
 
 impl PlacedSolid {
+    /// A solid as it is declared; `point` and `direction` place a point (mm) and a direction of the drawing pose.
+    pub fn of(
+        solid: &AddedSolid,
+        point: impl Fn(ExprPoint) -> Vector3<f64>,
+        direction: impl Fn(&Vector3<f64>) -> Vector3<f64>,
+    ) -> Self {
+        let column = |j: usize| direction(&Vector3::from_fn(|i, _| solid.rotation[i][j]));
+        Self {
+            source: solid.mesh.clone(),
+            file: solid.file.clone(),
+            turn: Matrix3::from_columns(&[column(0), column(1), column(2)]) * solid.scale,
+            shift: point(solid.position),
+            origin: solid.origin,
+        }
+    }
+
     /// The mesh where it is.
     pub fn mesh(&self) -> Mesh {
         let at = |p: &[f64; 3]| self.turn * Vector3::from(*p) + self.shift;
