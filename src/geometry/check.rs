@@ -67,6 +67,61 @@ struct Edge {
     corners: [usize; 2],
 }
 
+impl Edge {
+    /// Uses of edges, those of one edge side by side, edges ascending by their vertices.
+    fn sorted(triangles: &[[usize; 3]]) -> Vec<Edge> {
+        let mut edges: Vec<Edge> = Vec::with_capacity(3 * triangles.len());
+        for (t, ids) in triangles.iter().enumerate() {
+            for k in 0..3 {
+                let (i, j) = (ids[k], ids[(k + 1) % 3]);
+                let (here, there) = (3 * t + k, 3 * t + (k + 1) % 3);
+                let upwards = i < j;
+                let corners = if upwards { [here, there] } else { [there, here] };
+                edges.push(Edge { ends: (i.min(j), i.max(j)), triangle: t, upwards, corners });
+            }
+        }
+        edges.par_sort_unstable_by_key(|e| (e.ends, e.triangle, e.corners));
+        edges
+    }
+
+    /// The triangles at one edge that run through it upwards, and those that run downwards.
+    fn ways(uses: &[Edge]) -> (usize, usize) {
+        let up = uses.iter().filter(|e| e.upwards).count();
+        (up, uses.len() - up)
+    }
+}
+
+/// Edges of one kind: the vertices of the first one, and how many there are.
+pub(super) struct Edges {
+    pub first: (usize, usize),
+    pub count: usize,
+}
+
+/// Edges of a closed and oriented surface have one triangle each way.
+#[derive(Default)]
+pub(super) struct WrongEdges {
+    /// Those with one triangle.
+    pub open: Option<Edges>,
+    /// Those with more that do not have one each way.
+    pub mixed: Option<Edges>,
+}
+
+/// What is wrong with edges, by the vertices' indices: unlike [`check_mesh`] it merges none, so that an edge is what a file says.
+pub(super) fn wrong_edges(triangles: &[[usize; 3]]) -> WrongEdges {
+    let mut found = WrongEdges::default();
+    for uses in Edge::sorted(triangles).chunk_by(|a, b| a.ends == b.ends) {
+        let kind = match Edge::ways(uses) {
+            (1, 1) => continue,
+            (1, 0) | (0, 1) => &mut found.open,
+            _ => &mut found.mixed,
+        };
+        if let Some(first) = uses.first() {
+            kind.get_or_insert(Edges { first: first.ends, count: 0 }).count += 1;
+        }
+    }
+    found
+}
+
 /// A mesh with its vertices on the lattice, those on one point merged.
 struct OnLattice {
     points: Vec<Point>,
@@ -137,26 +192,21 @@ pub fn check_mesh(mesh: &Mesh) -> MeshFacts {
     let mut fans = Pieces::new(3 * on.triangles.len());
     let mut used = vec![false; on.points.len()];
     let mut sound = !on.triangles.is_empty() && mesh.vertices.iter().all(|p| p.iter().all(|x| x.is_finite()));
-    let mut edges: Vec<Edge> = Vec::with_capacity(3 * on.triangles.len());
-    for (t, ids) in on.triangles.iter().enumerate() {
+    for ids in &on.triangles {
         for k in 0..3 {
             let (i, j) = (ids[k], ids[(k + 1) % 3]);
             sound &= i != j && i < on.points.len() && j < on.points.len();
             if let Some(u) = used.get_mut(i) {
                 *u = true;
             }
-            let (here, there) = (3 * t + k, 3 * t + (k + 1) % 3);
-            let upwards = i < j;
-            let corners = if upwards { [here, there] } else { [there, here] };
-            edges.push(Edge { ends: (i.min(j), i.max(j)), triangle: t, upwards, corners });
         }
     }
-    edges.par_sort_unstable_by_key(|e| (e.ends, e.triangle, e.corners));
+    let edges = Edge::sorted(&on.triangles);
     let (mut closed, mut oriented) = (sound, sound);
     for uses in edges.chunk_by(|a, b| a.ends == b.ends) {
-        let up = uses.iter().filter(|e| e.upwards).count();
+        let (up, down) = Edge::ways(uses);
         closed &= uses.len() == 2;
-        oriented &= up <= 1 && uses.len() - up <= 1;
+        oriented &= up <= 1 && down <= 1;
         for pair in uses.windows(2) {
             piece.join(pair[0].triangle, pair[1].triangle);
             fans.join(pair[0].corners[0], pair[1].corners[0]);

@@ -1,7 +1,7 @@
 //! Meshes from files as parts of bodies: where they are, what is wrong with them, and how near others come. The primitives of links
 //! are convex, a mesh is not: its triangles stand in a tree of boxes, and what is inside is told by a ray.
 
-use super::check::check_mesh;
+use super::check::{Edges, WrongEdges, check_mesh, wrong_edges};
 use super::distance::{point_triangle, until_apart};
 use super::link::BodyPlan;
 use super::mesh::Mesh;
@@ -10,7 +10,6 @@ use crate::diagnostic::Origin;
 use crate::ir::{AddedSolid, ExprPoint, Placement, SurfaceFault, SurfaceFaultKind, TriangleMesh};
 use crate::math::Pose;
 use nalgebra::{Matrix3, Vector3};
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Triangles of a leaf at most.
@@ -90,23 +89,14 @@ pub fn faults(mesh: &TriangleMesh) -> &[SurfaceFault] {
 }
 
 fn look_for_faults(mesh: &TriangleMesh) -> Vec<SurfaceFault> {
-    let mut edges: BTreeMap<(usize, usize), (usize, usize)> = BTreeMap::new();
-    for t in &mesh.triangles {
-        for k in 0..3 {
-            let (i, j) = (t[k], t[(k + 1) % 3]);
-            let count = edges.entry((i.min(j), i.max(j))).or_default();
-            if i < j { count.0 += 1 } else { count.1 += 1 }
-        }
-    }
     let vertex = |i: usize| Vector3::from(mesh.vertices.get(i).copied().unwrap_or_default());
-    let of_edges = |kind, wrong: &dyn Fn(&(usize, usize)) -> bool| {
-        let mut found = edges.iter().filter(|(_, count)| wrong(count));
-        let ((i, j), _) = found.next()?;
-        let at = ((vertex(*i) + vertex(*j)) / 2.0).into();
-        Some(SurfaceFault { kind, count: 1 + found.count(), at })
+    let fault = |kind, edges: Edges| {
+        let (i, j) = edges.first;
+        SurfaceFault { kind, count: edges.count, at: ((vertex(i) + vertex(j)) / 2.0).into() }
     };
-    let open = of_edges(SurfaceFaultKind::Open, &|(up, down)| up + down == 1);
-    let mixed = of_edges(SurfaceFaultKind::NoSides, &|(up, down)| up + down > 1 && (*up, *down) != (1, 1));
+    let WrongEdges { open, mixed } = wrong_edges(&mesh.triangles);
+    let open = open.map(|e| fault(SurfaceFaultKind::Open, e));
+    let mixed = mixed.map(|e| fault(SurfaceFaultKind::NoSides, e));
     let mut found: Vec<SurfaceFault> = open.into_iter().chain(mixed).collect();
     let whole =
         Mesh { vertices: (0..mesh.vertices.len()).map(vertex).collect(), triangles: mesh.triangles.clone() };
