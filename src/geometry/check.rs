@@ -161,12 +161,7 @@ impl OnLattice {
     fn crossing_pairs(&self) -> Vec<(usize, usize)> {
         let corners: Vec<[Point; 3]> =
             (0..self.triangles.len()).into_par_iter().map(|t| self.corners(t)).collect();
-        // Whole numbers below 2^53: exact in floats.
-        let around = |t: &[Point; 3]| {
-            let [a, b, c] = t.map(|p| Vector3::from(p.map(|x| x as f64)));
-            (a.inf(&b).inf(&c), a.sup(&b).sup(&c))
-        };
-        let boxes: Vec<(Vector3<f64>, Vector3<f64>)> = corners.par_iter().map(around).collect();
+        let boxes: Vec<(Vector3<f64>, Vector3<f64>)> = corners.par_iter().map(bounds).collect();
         let solid: Vec<usize> = (0..corners.len()).into_par_iter().filter(|t| !self.is_flat(*t)).collect();
         let tree = Tree::build(&mut solid.clone(), &boxes);
         let meets = |near: &mut Vec<usize>, &t: &usize| {
@@ -260,6 +255,12 @@ impl Pieces {
 /// Pairs of triangles that have more in common than their corners and edges, sorted; those without an area apart.
 pub fn crossing_pairs(mesh: &Mesh) -> Vec<(usize, usize)> {
     OnLattice::new(mesh).crossing_pairs()
+}
+
+/// Least and largest corner of a triangle: whole numbers below 2^53, exact in floats.
+pub(super) fn bounds(t: &[Point; 3]) -> (Vector3<f64>, Vector3<f64>) {
+    let [a, b, c] = t.map(|p| Vector3::from(p.map(|x| x as f64)));
+    (a.inf(&b).inf(&c), a.sup(&b).sup(&c))
 }
 
 /// Halves of a tree with fewer triangles are not worth a second thread.

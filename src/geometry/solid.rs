@@ -5,6 +5,7 @@ use super::check::{Edges, WrongEdges, check_mesh, wrong_edges};
 use super::distance::{point_triangle, until_apart};
 use super::link::BodyPlan;
 use super::mesh::Mesh;
+use super::ray::Met;
 use super::slot::Slot;
 use crate::diagnostic::Origin;
 use crate::ir::{AddedSolid, ExprPoint, Placement, SurfaceFault, SurfaceFaultKind, TriangleMesh};
@@ -112,7 +113,8 @@ fn look_for_faults(mesh: &TriangleMesh) -> Vec<SurfaceFault> {
     found
 }
 
-/// A closed mesh, prepared for distances.
+/// A closed mesh, prepared for distances. Its tree is not [`super::check::Tree`], which tells what overlaps a box: here the nearest boxes
+/// come first and the bound shrinks on the way, and two trees are gone through together.
 pub(super) struct Surface {
     mesh: Mesh,
     /// Triangles, those of a leaf side by side.
@@ -381,19 +383,9 @@ impl Surface {
     }
 }
 
-/// Whether a ray meets a triangle (Möller and Trumbore 1997).
-fn meets(from: &Vector3<f64>, d: &Vector3<f64>, [a, b, c]: &[Vector3<f64>; 3]) -> bool {
-    let (e1, e2) = (b - a, c - a);
-    let p = d.cross(&e2);
-    let det = e1.dot(&p);
-    if det == 0.0 {
-        return false;
-    }
-    let s = from - a;
-    let u = s.dot(&p) / det;
-    let q = s.cross(&e1);
-    let v = d.dot(&q) / det;
-    u >= 0.0 && v >= 0.0 && u + v <= 1.0 && e2.dot(&q) / det > 0.0
+/// Whether a ray meets a triangle. Without slack: a crossing of an edge that is counted twice would turn inside out.
+fn meets(from: &Vector3<f64>, d: &Vector3<f64>, corners: &[Vector3<f64>; 3]) -> bool {
+    Met::new(from, d, corners).is_some_and(|met| met.is_within(0.0) && met.way > 0.0)
 }
 
 /// A body with solids, or beside one: its solids in the rest pose, where it is, and its primitives there.
