@@ -67,6 +67,61 @@ struct Edge {
     corners: [usize; 2],
 }
 
+impl Edge {
+    /// Uses of edges, those of one edge side by side, edges ascending by their vertices.
+    fn sorted(triangles: &[[usize; 3]]) -> Vec<Edge> {
+        let mut edges: Vec<Edge> = Vec::with_capacity(3 * triangles.len());
+        for (t, ids) in triangles.iter().enumerate() {
+            for k in 0..3 {
+                let (i, j) = (ids[k], ids[(k + 1) % 3]);
+                let (here, there) = (3 * t + k, 3 * t + (k + 1) % 3);
+                let upwards = i < j;
+                let corners = if upwards { [here, there] } else { [there, here] };
+                edges.push(Edge { ends: (i.min(j), i.max(j)), triangle: t, upwards, corners });
+            }
+        }
+        edges.par_sort_unstable_by_key(|e| (e.ends, e.triangle, e.corners));
+        edges
+    }
+
+    /// The triangles at one edge that run through it upwards, and those that run downwards.
+    fn ways(uses: &[Edge]) -> (usize, usize) {
+        let up = uses.iter().filter(|e| e.upwards).count();
+        (up, uses.len() - up)
+    }
+}
+
+/// Edges of one kind: the vertices of the first one, and how many there are.
+pub(super) struct Edges {
+    pub first: (usize, usize),
+    pub count: usize,
+}
+
+/// Edges of a closed and oriented surface have one triangle each way.
+#[derive(Default)]
+pub(super) struct WrongEdges {
+    /// Those with one triangle.
+    pub open: Option<Edges>,
+    /// Those with more that do not have one each way.
+    pub mixed: Option<Edges>,
+}
+
+/// What is wrong with edges, by the vertices' indices: unlike [`check_mesh`] it merges none, so that an edge is what a file says.
+pub(super) fn wrong_edges(triangles: &[[usize; 3]]) -> WrongEdges {
+    let mut found = WrongEdges::default();
+    for uses in Edge::sorted(triangles).chunk_by(|a, b| a.ends == b.ends) {
+        let kind = match Edge::ways(uses) {
+            (1, 1) => continue,
+            (1, 0) | (0, 1) => &mut found.open,
+            _ => &mut found.mixed,
+        };
+        if let Some(first) = uses.first() {
+            kind.get_or_insert(Edges { first: first.ends, count: 0 }).count += 1;
+        }
+    }
+    found
+}
+
 /// A mesh with its vertices on the lattice, those on one point merged.
 struct OnLattice {
     points: Vec<Point>,
@@ -106,12 +161,7 @@ impl OnLattice {
     fn crossing_pairs(&self) -> Vec<(usize, usize)> {
         let corners: Vec<[Point; 3]> =
             (0..self.triangles.len()).into_par_iter().map(|t| self.corners(t)).collect();
-        // Whole numbers below 2^53: exact in floats.
-        let around = |t: &[Point; 3]| {
-            let [a, b, c] = t.map(|p| Vector3::from(p.map(|x| x as f64)));
-            (a.inf(&b).inf(&c), a.sup(&b).sup(&c))
-        };
-        let boxes: Vec<(Vector3<f64>, Vector3<f64>)> = corners.par_iter().map(around).collect();
+        let boxes: Vec<(Vector3<f64>, Vector3<f64>)> = corners.par_iter().map(bounds).collect();
         let solid: Vec<usize> = (0..corners.len()).into_par_iter().filter(|t| !self.is_flat(*t)).collect();
         let tree = Tree::build(&mut solid.clone(), &boxes);
         let meets = |near: &mut Vec<usize>, &t: &usize| {
@@ -137,26 +187,21 @@ pub fn check_mesh(mesh: &Mesh) -> MeshFacts {
     let mut fans = Pieces::new(3 * on.triangles.len());
     let mut used = vec![false; on.points.len()];
     let mut sound = !on.triangles.is_empty() && mesh.vertices.iter().all(|p| p.iter().all(|x| x.is_finite()));
-    let mut edges: Vec<Edge> = Vec::with_capacity(3 * on.triangles.len());
-    for (t, ids) in on.triangles.iter().enumerate() {
+    for ids in &on.triangles {
         for k in 0..3 {
             let (i, j) = (ids[k], ids[(k + 1) % 3]);
             sound &= i != j && i < on.points.len() && j < on.points.len();
             if let Some(u) = used.get_mut(i) {
                 *u = true;
             }
-            let (here, there) = (3 * t + k, 3 * t + (k + 1) % 3);
-            let upwards = i < j;
-            let corners = if upwards { [here, there] } else { [there, here] };
-            edges.push(Edge { ends: (i.min(j), i.max(j)), triangle: t, upwards, corners });
         }
     }
-    edges.par_sort_unstable_by_key(|e| (e.ends, e.triangle, e.corners));
+    let edges = Edge::sorted(&on.triangles);
     let (mut closed, mut oriented) = (sound, sound);
     for uses in edges.chunk_by(|a, b| a.ends == b.ends) {
-        let up = uses.iter().filter(|e| e.upwards).count();
+        let (up, down) = Edge::ways(uses);
         closed &= uses.len() == 2;
-        oriented &= up <= 1 && uses.len() - up <= 1;
+        oriented &= up <= 1 && down <= 1;
         for pair in uses.windows(2) {
             piece.join(pair[0].triangle, pair[1].triangle);
             fans.join(pair[0].corners[0], pair[1].corners[0]);
@@ -210,6 +255,12 @@ impl Pieces {
 /// Pairs of triangles that have more in common than their corners and edges, sorted; those without an area apart.
 pub fn crossing_pairs(mesh: &Mesh) -> Vec<(usize, usize)> {
     OnLattice::new(mesh).crossing_pairs()
+}
+
+/// Least and largest corner of a triangle: whole numbers below 2^53, exact in floats.
+pub(super) fn bounds(t: &[Point; 3]) -> (Vector3<f64>, Vector3<f64>) {
+    let [a, b, c] = t.map(|p| Vector3::from(p.map(|x| x as f64)));
+    (a.inf(&b).inf(&c), a.sup(&b).sup(&c))
 }
 
 /// Halves of a tree with fewer triangles are not worth a second thread.

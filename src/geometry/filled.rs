@@ -62,7 +62,8 @@ impl Field {
     }
 }
 
-/// Where a line along x meets a triangle.
+/// Where a line along x meets a triangle. By areas seen along x, not as other rays are met: the test of an edge is the same
+/// from both of its triangles but for the sign, and a whole row of nodes is told by one line.
 fn along_x([a, b, c]: &[Vector3<f64>; 3], y: f64, z: f64) -> Option<f64> {
     let turn = |p: &Vector3<f64>, q: &Vector3<f64>| (p.y - y) * (q.z - z) - (p.z - z) * (q.y - y);
     let (u, v, w) = (turn(b, c), turn(c, a), turn(a, b));

@@ -4,9 +4,26 @@ use super::anchor::Anchor;
 use super::link::{BORE_WALL_MM, BOSS_BELOW_MM, BOSS_EXTRA_MM, BoreCut, Builder, FLAT, ROUND_MM, Role};
 use super::parts::HoleSolid;
 use super::slot::Slot;
+use crate::ir::{ExprPoint, Hole};
+use nalgebra::Vector3;
 
 /// How far a hole is cut beyond the faces of its boss, mm.
 const BEYOND_MM: f64 = 0.3;
+
+impl HoleSolid {
+    /// A hole as it is declared; `point` and `direction` place a point (mm) and a unit direction of the drawing pose.
+    pub fn of(
+        hole: &Hole,
+        point: impl Fn(ExprPoint) -> Vector3<f64>,
+        direction: impl Fn(&Vector3<f64>) -> Vector3<f64>,
+    ) -> Self {
+        Self {
+            point: point(hole.position),
+            axis: direction(&Vector3::from(hole.axis)),
+            diameter_mm: hole.diameter_mm,
+        }
+    }
+}
 
 impl Builder<'_> {
     /// A hole in a body of layers: upright in the body's own layer, or across it.

@@ -6,9 +6,9 @@ use super::parts::{BodySolid, Bore, Eye, FlexureSolid, HoleSolid, PartsInput};
 use super::slot::Facets;
 use super::solid::PlacedSolid;
 use crate::equilibrium::{Layout, Model};
-use crate::ir::{BodyId, Design, Joint, JointId, JointKind, Realization};
+use crate::ir::{BodyId, Design, ExprPoint, Joint, JointId, JointKind, Realization};
 use crate::rod::RodState;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 /// Points nearer than this are the same, mm.
 const SAME_POINT_MM: f64 = 1e-6;
@@ -44,6 +44,9 @@ pub fn parts_input(design: &Design, layout: &Layout, model: &Model) -> PartsInpu
                     !j.is_compliant() && j.kind == JointKind::Hinge && j.bodies.contains(&b)
                 });
             let eyes = eyes.filter(|(j, _)| !is_borne_by_motor(design, *j, b));
+            let pose = &layout.rest_poses[b];
+            let placed = |p: ExprPoint| pose.point(&drawn(p));
+            let turned = |d: &Vector3<f64>| pose.direction(d);
             BodySolid {
                 name: body.name.clone(),
                 of_flexure: body.owner.is_some(),
@@ -67,30 +70,8 @@ pub fn parts_input(design: &Design, layout: &Layout, model: &Model) -> PartsInpu
                     margin_mm: p.margin_mm,
                     origin: p.origin,
                 }),
-                solids: body
-                    .fittings
-                    .solids
-                    .iter()
-                    .map(|s| {
-                        let (pose, row) = (&layout.rest_poses[b], s.rotation);
-                        PlacedSolid {
-                            source: s.mesh.clone(),
-                            file: s.file.clone(),
-                            turn: pose.rotation * Matrix3::from_fn(|i, j| row[i][j]) * s.scale,
-                            shift: pose.point(&drawn(s.position)),
-                            origin: s.origin,
-                        }
-                    })
-                    .collect(),
-                holes: body
-                    .holes
-                    .iter()
-                    .map(|hole| HoleSolid {
-                        point: layout.rest_poses[b].point(&drawn(hole.position)),
-                        axis: layout.rest_poses[b].direction(&Vector3::from(hole.axis)),
-                        diameter_mm: hole.diameter_mm,
-                    })
-                    .collect(),
+                solids: body.fittings.solids.iter().map(|s| PlacedSolid::of(s, placed, turned)).collect(),
+                holes: body.holes.iter().map(|h| HoleSolid::of(h, placed, turned)).collect(),
             }
         })
         .collect();

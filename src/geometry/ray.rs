@@ -34,10 +34,7 @@ impl<'a> Probe<'a> {
         self.tree.query(&(from.inf(&to), from.sup(&to)), &mut near, &self.boxes);
         let mut hits: Vec<(f64, bool)> = near
             .into_iter()
-            .filter_map(|t| {
-                let [a, b, c] = self.mesh.corners(t);
-                ray_hits(from, &d, &a, &b, &c)
-            })
+            .filter_map(|t| ray_hits(from, &d, &self.mesh.corners(t)))
             .filter(|(t, _)| *t >= 0.0 && *t <= reach_mm)
             .collect();
         hits.sort_by(|p, q| p.0.total_cmp(&q.0));
@@ -62,28 +59,41 @@ impl<'a> Probe<'a> {
     }
 }
 
-/// Distance to a triangle along a unit ray and whether the ray leaves through it (Möller and
-/// Trumbore 1997). Edges count on both sides: a ray through one may be reported twice at one place.
-fn ray_hits(
-    from: &Vector3<f64>,
-    d: &Vector3<f64>,
-    a: &Vector3<f64>,
-    b: &Vector3<f64>,
-    c: &Vector3<f64>,
-) -> Option<(f64, bool)> {
-    let (e1, e2) = (b - a, c - a);
-    let p = d.cross(&e2);
-    let det = e1.dot(&p);
-    if det.abs() < 1e-14 {
-        return None;
+/// Distance to a triangle along a unit ray and whether the ray leaves through it. Edges count on both sides: a ray through
+/// one may be reported twice at one place.
+fn ray_hits(from: &Vector3<f64>, d: &Vector3<f64>, corners: &[Vector3<f64>; 3]) -> Option<(f64, bool)> {
+    const SLACK: f64 = 1e-9;
+    let met = Met::new(from, d, corners)?;
+    (met.det.abs() >= 1e-14 && met.is_within(SLACK)).then_some((met.way, met.det < 0.0))
+}
+
+/// Where a line meets the plane of a triangle (Möller and Trumbore 1997).
+pub(super) struct Met {
+    /// Coordinates along the edges from the first corner.
+    u: f64,
+    v: f64,
+    /// Way from the line's point, in lengths of its direction.
+    pub way: f64,
+    /// Negative where the line leaves through the triangle.
+    det: f64,
+}
+
+impl Met {
+    /// None: the line is parallel to the plane.
+    pub(super) fn new(from: &Vector3<f64>, d: &Vector3<f64>, [a, b, c]: &[Vector3<f64>; 3]) -> Option<Self> {
+        let (e1, e2) = (b - a, c - a);
+        let p = d.cross(&e2);
+        let det = e1.dot(&p);
+        if det == 0.0 {
+            return None;
+        }
+        let s = from - a;
+        let q = s.cross(&e1);
+        Some(Self { u: s.dot(&p) / det, v: d.dot(&q) / det, way: e2.dot(&q) / det, det })
     }
-    let s = from - a;
-    let u = s.dot(&p) / det;
-    let q = s.cross(&e1);
-    let v = d.dot(&q) / det;
-    let slack = 1e-9;
-    if u < -slack || v < -slack || u + v > 1.0 + slack {
-        return None;
+
+    /// Whether that is in the triangle, or beside it by so little (in parts of its edges).
+    pub(super) fn is_within(&self, slack: f64) -> bool {
+        self.u >= -slack && self.v >= -slack && self.u + self.v <= 1.0 + slack
     }
-    Some((e2.dot(&q) / det, det < 0.0))
 }

@@ -1,16 +1,16 @@
 //! Meshes from files as parts of bodies: where they are, what is wrong with them, and how near others come. The primitives of links
 //! are convex, a mesh is not: its triangles stand in a tree of boxes, and what is inside is told by a ray.
 
-use super::check::check_mesh;
+use super::check::{Edges, WrongEdges, check_mesh, wrong_edges};
 use super::distance::{point_triangle, until_apart};
 use super::link::BodyPlan;
 use super::mesh::Mesh;
+use super::ray::Met;
 use super::slot::Slot;
 use crate::diagnostic::Origin;
-use crate::ir::{Placement, SurfaceFault, SurfaceFaultKind, TriangleMesh};
+use crate::ir::{AddedSolid, ExprPoint, Placement, SurfaceFault, SurfaceFaultKind, TriangleMesh};
 use crate::math::Pose;
 use nalgebra::{Matrix3, Vector3};
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Triangles of a leaf at most.
@@ -40,6 +40,22 @@ pub struct PlacedSolid {
 }
 
 impl PlacedSolid {
+    /// A solid as it is declared; `point` and `direction` place a point (mm) and a direction of the drawing pose.
+    pub fn of(
+        solid: &AddedSolid,
+        point: impl Fn(ExprPoint) -> Vector3<f64>,
+        direction: impl Fn(&Vector3<f64>) -> Vector3<f64>,
+    ) -> Self {
+        let column = |j: usize| direction(&Vector3::from_fn(|i, _| solid.rotation[i][j]));
+        Self {
+            source: solid.mesh.clone(),
+            file: solid.file.clone(),
+            turn: Matrix3::from_columns(&[column(0), column(1), column(2)]) * solid.scale,
+            shift: point(solid.position),
+            origin: solid.origin,
+        }
+    }
+
     /// The mesh where it is.
     pub fn mesh(&self) -> Mesh {
         let at = |p: &[f64; 3]| self.turn * Vector3::from(*p) + self.shift;
@@ -74,23 +90,14 @@ pub fn faults(mesh: &TriangleMesh) -> &[SurfaceFault] {
 }
 
 fn look_for_faults(mesh: &TriangleMesh) -> Vec<SurfaceFault> {
-    let mut edges: BTreeMap<(usize, usize), (usize, usize)> = BTreeMap::new();
-    for t in &mesh.triangles {
-        for k in 0..3 {
-            let (i, j) = (t[k], t[(k + 1) % 3]);
-            let count = edges.entry((i.min(j), i.max(j))).or_default();
-            if i < j { count.0 += 1 } else { count.1 += 1 }
-        }
-    }
     let vertex = |i: usize| Vector3::from(mesh.vertices.get(i).copied().unwrap_or_default());
-    let of_edges = |kind, wrong: &dyn Fn(&(usize, usize)) -> bool| {
-        let mut found = edges.iter().filter(|(_, count)| wrong(count));
-        let ((i, j), _) = found.next()?;
-        let at = ((vertex(*i) + vertex(*j)) / 2.0).into();
-        Some(SurfaceFault { kind, count: 1 + found.count(), at })
+    let fault = |kind, edges: Edges| {
+        let (i, j) = edges.first;
+        SurfaceFault { kind, count: edges.count, at: ((vertex(i) + vertex(j)) / 2.0).into() }
     };
-    let open = of_edges(SurfaceFaultKind::Open, &|(up, down)| up + down == 1);
-    let mixed = of_edges(SurfaceFaultKind::NoSides, &|(up, down)| up + down > 1 && (*up, *down) != (1, 1));
+    let WrongEdges { open, mixed } = wrong_edges(&mesh.triangles);
+    let open = open.map(|e| fault(SurfaceFaultKind::Open, e));
+    let mixed = mixed.map(|e| fault(SurfaceFaultKind::NoSides, e));
     let mut found: Vec<SurfaceFault> = open.into_iter().chain(mixed).collect();
     let whole =
         Mesh { vertices: (0..mesh.vertices.len()).map(vertex).collect(), triangles: mesh.triangles.clone() };
@@ -106,7 +113,8 @@ fn look_for_faults(mesh: &TriangleMesh) -> Vec<SurfaceFault> {
     found
 }
 
-/// A closed mesh, prepared for distances.
+/// A closed mesh, prepared for distances. Its tree is not [`super::check::Tree`], which tells what overlaps a box: here the nearest boxes
+/// come first and the bound shrinks on the way, and two trees are gone through together.
 pub(super) struct Surface {
     mesh: Mesh,
     /// Triangles, those of a leaf side by side.
@@ -375,19 +383,9 @@ impl Surface {
     }
 }
 
-/// Whether a ray meets a triangle (Möller and Trumbore 1997).
-fn meets(from: &Vector3<f64>, d: &Vector3<f64>, [a, b, c]: &[Vector3<f64>; 3]) -> bool {
-    let (e1, e2) = (b - a, c - a);
-    let p = d.cross(&e2);
-    let det = e1.dot(&p);
-    if det == 0.0 {
-        return false;
-    }
-    let s = from - a;
-    let u = s.dot(&p) / det;
-    let q = s.cross(&e1);
-    let v = d.dot(&q) / det;
-    u >= 0.0 && v >= 0.0 && u + v <= 1.0 && e2.dot(&q) / det > 0.0
+/// Whether a ray meets a triangle. Without slack: a crossing of an edge that is counted twice would turn inside out.
+fn meets(from: &Vector3<f64>, d: &Vector3<f64>, corners: &[Vector3<f64>; 3]) -> bool {
+    Met::new(from, d, corners).is_some_and(|met| met.is_within(0.0) && met.way > 0.0)
 }
 
 /// A body with solids, or beside one: its solids in the rest pose, where it is, and its primitives there.

@@ -19,8 +19,8 @@ const LEAST_COSINE: f64 = 0.97;
 /// Passes over all edges and slivers; the next finds what the last made possible. All examples are done after five.
 const PASSES: usize = 8;
 
-/// Where rounding lets triangles cross, edges up to twice, four, … times as long are collapsed, this many times at most: Klann's frame is
-/// done after one. The longest, 0.08 mm, is still below what a printer resolves.
+/// Where rounding lets triangles cross, edges up to twice, four, … times as long are collapsed, this many times at most. The
+/// longest, 0.08 mm, is still below what a printer resolves.
 const MENDS: i32 = 3;
 
 /// A united solid as it is written: without short edges and slivers as far as they can go, exact in `f32`, sorted; and free of crossings where

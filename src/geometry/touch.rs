@@ -1,6 +1,6 @@
 //! Which solids touch: those that do not need no boolean kernel to be one mesh.
 
-use super::check::Tree;
+use super::check::{self, Tree};
 use super::exact::{Point, on_lattice, triangles_meet};
 use super::mesh::Mesh;
 use nalgebra::Vector3;
@@ -26,14 +26,7 @@ impl<'m> Solid<'m> {
     pub(super) fn new(mesh: &'m Mesh) -> Self {
         let corners: Vec<[Point; 3]> =
             (0..mesh.triangles.len()).map(|t| mesh.corners(t).map(|p| on_lattice(&p))).collect();
-        // Whole numbers below 2^53: exact in floats.
-        let boxes: Vec<Bounds> = corners
-            .iter()
-            .map(|t| {
-                let [a, b, c] = t.map(|p| Vector3::from(p.map(|x| x as f64)));
-                (a.inf(&b).inf(&c), a.sup(&b).sup(&c))
-            })
-            .collect();
+        let boxes: Vec<Bounds> = corners.iter().map(check::bounds).collect();
         let far = Vector3::repeat(f64::INFINITY);
         let bounds = boxes.iter().fold((far, -far), |(lo, hi), b| (lo.inf(&b.0), hi.sup(&b.1)));
         let mut ids: Vec<usize> = (0..boxes.len()).collect();
@@ -69,7 +62,7 @@ impl<'m> Solid<'m> {
     }
 
     /// Whether a point that is not on the surface lies inside: by the solid angle under which the surface is seen (van
-    /// Oosterom and Strackee 1983).
+    /// Oosterom and Strackee 1983). No ray: primitives are symmetric, and one through an edge would decide it by rounding.
     pub(super) fn holds(&self, p: &Vector3<f64>) -> bool {
         let at = Vector3::from(on_lattice(p).map(|x| x as f64));
         if !overlap(&(at, at), &self.bounds) {

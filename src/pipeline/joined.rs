@@ -12,7 +12,7 @@ use crate::geometry::{
 };
 use crate::ir::assembly::Joined;
 use crate::ir::{Assembly, Instance};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use std::sync::Arc;
 
 /// A design in solids.
@@ -124,8 +124,10 @@ pub fn parts(
         }
     };
     let known: Vec<Known<'_>> = solids.iter().map(Solid::known).collect();
-    let whole = joined(assembly, &known, carved).map_err(failed(&assembly.name, assembly.origin))?;
-    let (mut out, mut found) = (Vec::new(), seats(assembly, &known));
+    let of_all = || failed(&assembly.name, assembly.origin);
+    let frames = frames(assembly, &known).map_err(of_all())?;
+    let whole = joined(assembly, &known, &frames, carved).map_err(of_all())?;
+    let (mut out, mut found) = (Vec::new(), seats(assembly, &frames));
     for group in whole.groups() {
         let Some((name, at)) = name(assembly, solids, &whole, &group) else { continue };
         // Repeated instances are named with brackets, which shells and some slicers take for patterns.
@@ -166,6 +168,7 @@ pub fn parts(
 fn joined(
     assembly: &Assembly,
     designs: &[Known<'_>],
+    frames: &[(&Joined, Frame)],
     carved: Option<&Carving>,
 ) -> Result<Whole, GeometryError> {
     let mut known: Vec<(usize, usize)> = Vec::new();
@@ -188,15 +191,20 @@ fn joined(
         shares.push(Share { input, plans, carving, states, placement: instance.placement, bodies });
     }
     let states = shares.iter().map(|s| s.states.len()).min().unwrap_or(0);
-    let mut frames = Vec::new();
-    for joined in own(assembly) {
-        let body = known.iter().find(|k| assembly.joined.get(k.0) == Some(joined)).map(|k| k.1);
-        if let (Some(frame), Some(body)) = (frame(assembly, joined, designs), body) {
-            frames.push((frame?, body));
-        }
-    }
-    shares.extend(frames.iter().map(|(frame, body)| frame.share(*body, states)));
+    shares.extend(frames.iter().filter_map(|(joined, frame)| {
+        let (_, body) = known.iter().find(|k| assembly.joined.get(k.0) == Some(joined))?;
+        Some(frame.share(*body, states))
+    }));
     join(&shares, carved)
+}
+
+/// What the assembly's bodies have of their own, planned.
+fn frames<'a>(
+    assembly: &'a Assembly,
+    designs: &[Known<'_>],
+) -> Result<Vec<(&'a Joined, Frame)>, GeometryError> {
+    let planned = |j: &'a Joined| Some(frame(assembly, j, designs)?.map(|frame| (j, frame)));
+    own(assembly).filter_map(planned).collect()
 }
 
 /// What a joined body has of its own, planned; none: nothing is known of its members.
@@ -208,15 +216,8 @@ fn frame(
     let of = |i: usize| assembly.instances.get(i).and_then(|n| Some((n, designs.get(n.design)?)));
     let (_, like) = joined.members.first().and_then(|(i, _)| of(*i))?;
     let skeleton: Vec<Vector3<f64>> = joined.skeleton.iter().map(|p| Vector3::from(*p)).collect();
-    let holes: Vec<HoleSolid> = joined
-        .holes
-        .iter()
-        .map(|h| HoleSolid {
-            point: assembly.place(h.position),
-            axis: Vector3::from(h.axis),
-            diameter_mm: h.diameter_mm,
-        })
-        .collect();
+    let (placed, turned) = (|p| assembly.place(p), |d: &Vector3<f64>| *d);
+    let holes: Vec<HoleSolid> = joined.holes.iter().map(|h| HoleSolid::of(h, placed, turned)).collect();
     // Without points of its own, what is fitted is joined to the nearest place of the members.
     let nearest = |at: &Vector3<f64>| {
         let plans = joined.members.iter().filter_map(|(i, b)| {
@@ -238,13 +239,7 @@ fn frame(
         MountSolid::standing(m, at, m.toward.map(|q| assembly.place(q)), rest(&at), sizes)
     };
     let mounts: Vec<MountSolid> = joined.fittings.mounts.iter().map(mount).collect();
-    let solids = joined.fittings.solids.iter().map(|s| PlacedSolid {
-        source: s.mesh.clone(),
-        file: s.file.clone(),
-        turn: Matrix3::from_fn(|i, j| s.rotation[i][j]) * s.scale,
-        shift: assembly.place(s.position),
-        origin: s.origin,
-    });
+    let solids = joined.fittings.solids.iter().map(|s| PlacedSolid::of(s, placed, turned));
     let fitted = holes.iter().map(|h| h.point).chain(mounts.iter().map(|m| m.point));
     let ties: Vec<Vector3<f64>> =
         if skeleton.is_empty() { fitted.filter_map(|p| nearest(&p)).collect() } else { Vec::new() };
@@ -260,12 +255,12 @@ fn frame(
 }
 
 /// What is wrong with motors on bodies of the assembly's own.
-fn seats(assembly: &Assembly, designs: &[Known<'_>]) -> Vec<Diagnostic> {
+fn seats(assembly: &Assembly, frames: &[(&Joined, Frame)]) -> Vec<Diagnostic> {
     let mut found = Vec::new();
-    for joined in own(assembly) {
+    for (joined, frame) in frames {
         let first = joined.members.first().and_then(|(i, _)| assembly.instances.get(*i));
         let design = first.and_then(|i| assembly.designs.get(i.design));
-        if let (Some(design), Some(Ok(frame))) = (design, frame(assembly, joined, designs)) {
+        if let Some(design) = design {
             let faults = frame.plans.iter().flat_map(|p| &p.faults);
             found.extend(faults.map(|f| super::solids::fit_fault(design, f)));
         }
@@ -454,7 +449,8 @@ fn not_carved(assembly: &Assembly, solids: &[Solid], whole: &Whole) -> Vec<Diagn
 pub fn between(assembly: &Assembly, designs: &[&Planned]) -> Between {
     let all: Vec<Known<'_>> = designs.iter().map(|p| p.known()).collect();
     // Where no solid comes out the mesh stage says why.
-    let Ok(mut whole) = joined(assembly, &all, None) else { return Between::default() };
+    let Ok(frames) = frames(assembly, &all) else { return Between::default() };
+    let Ok(mut whole) = joined(assembly, &all, &frames, None) else { return Between::default() };
     let gaps = whole.gaps();
     let known = |i: usize, a: Member, b: Member| {
         let Some(p) = assembly.instances.get(i).and_then(|n| designs.get(n.design)) else { return false };
