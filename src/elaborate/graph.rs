@@ -3,7 +3,8 @@
 
 use crate::ir::expr::{ExprGraph, ExprId, Node};
 
-fn with_operands(node: &Node, f: impl Fn(ExprId) -> ExprId) -> Node {
+/// The node with other operands.
+pub fn with_operands(node: &Node, f: impl Fn(ExprId) -> ExprId) -> Node {
     match *node {
         Node::Const(v) => Node::Const(v),
         Node::Free(i) => Node::Free(i),

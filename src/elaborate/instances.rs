@@ -2,6 +2,7 @@
 
 use super::codes;
 use super::dimension::Dimension;
+use super::drawn::{Drawn, Places};
 use super::eval::{Env, Evaluator, Failed, Outcome};
 use super::given::{Given, GivenKey};
 use super::load::Program;
@@ -14,9 +15,10 @@ use super::settings::Settings;
 use super::sheet::Sheet;
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::ir::assembly::{AssemblyExport, AssemblyRequirement, InstanceDrive, Joined, PlacedDrive};
-use crate::ir::{Assembly, Design, Export, ExportKind, Instance, JointKind, Placement};
+use crate::ir::{Assembly, Design, Export, ExportKind, ExprPoint, Instance, JointKind, Placement};
 use crate::syntax::ast::{self, Expr, Ident, Item, Mechanism, StatementKind};
 use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
 
 /// Whether a mechanism is made of others.
 pub fn is_assembly(m: &Mechanism) -> bool {
@@ -72,8 +74,8 @@ impl Parts {
             Some(group) => group.members.push(second),
             None => {
                 let members = first.into_iter().chain([second]).collect();
-                let (skeleton, holes, fittings) = Default::default();
-                self.joined.push(Joined { name, members, skeleton, holes, fittings, origin: at });
+                let (skeleton, holes, fittings, hinged) = Default::default();
+                self.joined.push(Joined { name, members, skeleton, holes, fittings, hinged, origin: at });
             }
         }
     }
@@ -115,8 +117,6 @@ impl<'a> Evaluator<'a> {
     ) -> Option<Assembly> {
         let scope = self.scope(outside.module);
         let sheet = self.sheet(scope, m);
-        self.force_all(scope);
-        self.assertions(scope, &sheet);
         self.only_instances(&sheet, m);
         let grounds: BTreeSet<&str> = sheet.bodies.iter().map(|b| b.name.node.as_str()).collect();
         let mut parts = Parts::default();
@@ -125,10 +125,19 @@ impl<'a> Evaluator<'a> {
             if self.put(scope, place, *at, outside, &grounds, &mut parts).is_err() {
                 parts.failed.insert(place.name.node.clone());
             }
+            self.stands(&place.name, &parts);
         }
         self.mirrors(&sheet, &mut parts);
-        self.own_shapes(scope, &sheet, &mut parts);
-        let exprs = self.own_fittings(scope, &sheet, &mut parts, outside);
+        for (mirror, _) in &sheet.mirrors {
+            self.stands(&mirror.name, &parts);
+        }
+        // Names may mean points of instances.
+        self.force_all(scope);
+        self.assertions(scope, &sheet);
+        let mut places = Places::default();
+        self.own_shapes(scope, &sheet, &mut parts, &mut places);
+        self.own_fittings(scope, &sheet, &mut parts, outside, &mut places);
+        let Places { exprs, free } = places;
         self.same_cycles(&parts);
         self.same_stuff(&parts);
         let requirements = queries
@@ -149,6 +158,7 @@ impl<'a> Evaluator<'a> {
             requirements,
             exports,
             exprs,
+            free,
             origin: m.name.at,
         })
     }
@@ -169,17 +179,13 @@ impl<'a> Evaluator<'a> {
                     );
                     continue;
                 }
-                StatementKind::Horn(_) | StatementKind::Plate(_) => {
-                    let (what, label) = match &s.kind {
-                        StatementKind::Horn(_) => {
-                            ("horn", "a horn sits on a hinge, and hinges stand in mechanisms")
-                        }
-                        _ => ("plate", "a plate lies in a layer, and layers are those of mechanisms"),
-                    };
-                    let message = format!("`{what}` beside instances is not available yet");
+                StatementKind::Plate(_) => {
+                    let message = "`plate` beside instances is not available yet";
                     let help = "write it in the mechanism that is placed: every copy then has its own";
                     self.out.push(
-                        Diagnostic::error(codes::LATER_STATEMENT, message, s.at).label(label).help(help),
+                        Diagnostic::error(codes::LATER_STATEMENT, message, s.at)
+                            .label("a plate lies in a layer, and layers are those of mechanisms")
+                            .help(help),
                     );
                     continue;
                 }
@@ -214,18 +220,11 @@ impl<'a> Evaluator<'a> {
     }
 
     /// The points of grounds of the assembly's own: what they reach beside what is merged into them.
-    fn own_shapes(&mut self, scope: usize, sheet: &Sheet<'a>, parts: &mut Parts) {
+    fn own_shapes(&mut self, scope: usize, sheet: &Sheet<'a>, parts: &mut Parts, places: &mut Places) {
         for text in sheet.bodies.iter().filter(|b| b.ground && !b.points.is_empty()) {
             let Ok(body) = self.body(scope, text) else { continue };
-            let what = "a point of a ground beside instances";
-            let points = body.skeleton.iter().map(|p| {
-                let mut at = [0.0; 3];
-                for (slot, id) in at.iter_mut().zip(p.position) {
-                    *slot = self.fixed(id, text.at, what)?;
-                }
-                Ok(at)
-            });
-            let Ok(points) = points.collect::<Outcome<Vec<[f64; 3]>>>() else { continue };
+            let points = body.skeleton.iter().map(|p| self.standing_place(p.position, text.at, places));
+            let Ok(points) = points.collect::<Outcome<Vec<ExprPoint>>>() else { continue };
             match parts.joined.iter_mut().find(|j| j.name == body.name) {
                 Some(joined) => (joined.skeleton, joined.origin) = (points, text.at),
                 // A `place` that went wrong may have been the one.
@@ -238,6 +237,18 @@ impl<'a> Evaluator<'a> {
                     )
                     .help(format!("write `place … merging GROUND into {}`", body.name)),
                 ),
+            }
+        }
+    }
+
+    /// From now on an instance's points can be named.
+    fn stands(&mut self, name: &Ident, parts: &Parts) {
+        match parts.instance(&name.node).and_then(|i| parts.instances.get(i)) {
+            Some(i) if !parts.failed.contains(&name.node) => {
+                self.drawn.placed.insert(i.name.clone(), (i.design, i.placement));
+            }
+            _ => {
+                self.drawn.failed.insert(name.node.clone());
             }
         }
     }
@@ -362,6 +373,8 @@ impl<'a> Evaluator<'a> {
         self.out.append(&mut inner.out);
         self.used.append(&mut inner.used);
         let mut design = made.filter(|_| !bad)?;
+        let drawn = Drawn::of(&mut inner, &design.free);
+        self.drawn.of.push(Rc::new(drawn));
         if scale != 1.0 || !given.is_empty() {
             design.name = instance.node.clone();
         }
