@@ -15,7 +15,7 @@ use super::settings::Settings;
 use super::sheet::Sheet;
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::ir::assembly::{AssemblyExport, AssemblyRequirement, InstanceDrive, Joined, PlacedDrive};
-use crate::ir::{Assembly, Design, Export, ExportKind, ExprPoint, Instance, JointKind, Placement};
+use crate::ir::{Assembly, CodeKind, Design, Export, ExportKind, ExprPoint, Instance, JointKind, Placement};
 use crate::syntax::ast::{self, Expr, Ident, Item, Mechanism, StatementKind};
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
@@ -146,7 +146,7 @@ impl<'a> Evaluator<'a> {
             .filter_map(|q| self.instance_requirement(scope, q, &parts, outside).ok())
             .collect();
         let exports =
-            queries.exports.iter().filter_map(|q| self.instance_export(scope, q, &parts).ok()).collect();
+            queries.exports.iter().filter_map(|q| self.export_of_all(scope, q, &parts).ok()).collect();
         let Parts { designs, instances, joined, motors, .. } = parts;
         let name = m.name.node.clone();
         Some(Assembly {
@@ -552,6 +552,44 @@ impl<'a> Evaluator<'a> {
         Ok(AssemblyRequirement { instance, requirement })
     }
 
+    /// An export; one of drives of several instances is put together of those of each.
+    fn export_of_all(
+        &mut self,
+        scope: usize,
+        each: &'a [Query<Expr>],
+        parts: &Parts,
+    ) -> Outcome<AssemblyExport> {
+        if let [one] = each {
+            return self.instance_export(scope, one, parts);
+        }
+        // All are looked at before any of them fails.
+        let found: Vec<Outcome<AssemblyExport>> =
+            each.iter().map(|q| self.instance_export(scope, q, parts)).collect();
+        let found = found.into_iter().collect::<Outcome<Vec<AssemblyExport>>>()?;
+        let (mut motors, mut code) = (Vec::new(), None);
+        for one in &found {
+            let (kind, drives) = match &one.export.kind {
+                ExportKind::Arduino(drive) => (CodeKind::Arduino, vec![*drive]),
+                ExportKind::Code(kind, drives) => (*kind, drives.clone()),
+                _ => return Err(Failed),
+            };
+            code = Some(kind);
+            let instance = one.instance.and_then(|i| parts.instances.get(i)).ok_or(Failed)?;
+            // Without a drive, all of the instance.
+            let all = || (0..instance.drives.len()).collect();
+            let drives: Vec<usize> = if drives.is_empty() { all() } else { drives };
+            for motor in drives.iter().filter_map(|d| instance.drives.get(*d)).map(|d| d.motor) {
+                // One that instances have in common is there once.
+                if !motors.contains(&motor) {
+                    motors.push(motor);
+                }
+            }
+        }
+        let kind = ExportKind::Code(code.ok_or(Failed)?, Vec::new());
+        let origin = each.first().map(|q| q.at).unwrap_or_default();
+        Ok(AssemblyExport { instance: None, export: Export { kind, origin }, motors })
+    }
+
     fn instance_export(
         &mut self,
         scope: usize,
@@ -573,6 +611,6 @@ impl<'a> Evaluator<'a> {
         {
             (instance, *drive) = (Some(motor.instance), motor.drive);
         }
-        Ok(AssemblyExport { instance, export: Export { origin: query.at, ..export } })
+        Ok(AssemblyExport { instance, export: Export { origin: query.at, ..export }, motors: Vec::new() })
     }
 }

@@ -9,8 +9,9 @@ use super::mechanism::Outside;
 use super::sheet::Sheet;
 use super::structure::{SAME_POINT_MM, StandingHinge, Structure};
 use crate::diagnostic::{Diagnostic, Origin};
-use crate::ir::JointKind;
 use crate::ir::assembly::{HingeFitting, Hinged, InstanceHinge};
+use crate::ir::expr::Node;
+use crate::ir::{Design, Horn, JointKind, Mount, Placement};
 use crate::syntax::ast::Ident;
 use nalgebra::Vector3;
 
@@ -58,12 +59,14 @@ impl<'a> Evaluator<'a> {
         for (text, at) in sheet.mounts.iter().filter(|t| known(&t.0.body)) {
             let Ok((joined, mut mount)) = self.mount(scope, outside.module, text, *at, &s) else { continue };
             let Ok(place) = self.standing_place(mount.position, *at, places) else { continue };
+            let start = mount.toward.map(|q| Vector3::from(self.start_point(q)));
             let toward = mount.toward.map(|q| self.standing_place(q, *at, places)).transpose();
             let Ok(toward) = toward else { continue };
             (mount.position, mount.toward) = (place, toward);
             if let Some(hinge) = mount.joint {
                 let hinges = coinciding(hinge, &text.body, &s, parts);
                 mount.joint = hinges.first().map(|h| h.joint);
+                mount_in_designs(&mount, start, &hinges, parts);
                 let hinged = Hinged { hinges, fitting: HingeFitting::Mount(mount) };
                 parts.joined.get_mut(joined).into_iter().for_each(|j| j.hinged.push(hinged.clone()));
             } else if self.stands_still(joined, &text.body, parts).is_ok() {
@@ -75,6 +78,10 @@ impl<'a> Evaluator<'a> {
             let hinges = coinciding(horn.joint, &text.body, &s, parts);
             let Some(first) = hinges.first() else { continue };
             horn.joint = first.joint;
+            for (h, _, design) in in_all(&hinges, parts) {
+                let horn = Horn { joint: h.joint, ..horn.clone() };
+                design.bodies.get_mut(h.body).into_iter().for_each(|b| b.fittings.horns.push(horn.clone()));
+            }
             let hinged = Hinged { hinges, fitting: HingeFitting::Horn(horn) };
             parts.joined.get_mut(joined).into_iter().for_each(|j| j.hinged.push(hinged.clone()));
         }
@@ -192,4 +199,43 @@ fn coinciding(hinge: usize, name: &Ident, s: &Structure<'_>, parts: &Parts) -> V
     // Within one mechanism a motor stands on one hinge.
     out.dedup_by_key(|h| h.instance);
     out
+}
+
+/// Designs every instance of which has one of the hinges, each with its first hinge and the place of that instance: what stands
+/// there stands in the design too, whose own gaps and collisions are with it.
+fn in_all<'p>(
+    hinges: &[InstanceHinge],
+    parts: &'p mut Parts,
+) -> impl Iterator<Item = (InstanceHinge, Placement, &'p mut Design)> {
+    let Parts { designs, instances, .. } = parts;
+    let of: Vec<_> = (0..designs.len())
+        .map(|d| {
+            let mut own = instances.iter().enumerate().filter(|(_, n)| n.design == d).map(|(i, _)| {
+                let hinge = hinges.iter().find(|h| h.instance == i).copied();
+                hinge.zip(instances.get(i).map(|n| n.placement))
+            });
+            let first = own.next().flatten();
+            // Where hinges differ, no one of them stands for all.
+            first.filter(|(f, _)| own.all(|o| o.is_some_and(|(h, _)| (h.joint, h.body) == (f.joint, f.body))))
+        })
+        .collect();
+    designs.iter_mut().zip(of).filter_map(|(design, of)| of.map(|(hinge, place)| (hinge, place, design)))
+}
+
+fn mount_in_designs(
+    mount: &Mount,
+    toward: Option<Vector3<f64>>,
+    hinges: &[InstanceHinge],
+    parts: &mut Parts,
+) {
+    for (hinge, place, design) in in_all(hinges, parts) {
+        let Some(position) = design.joints.get(hinge.joint).map(|j| j.point) else { continue };
+        let along = mount.along.map(|d| place.direction_within(&Vector3::from(d)).into());
+        let toward = toward.map(|q| {
+            let q = place.point_within(&q);
+            [q.x, q.y, q.z].map(|x| design.exprs.push(Node::Const(x)))
+        });
+        let mount = Mount { position, along, joint: Some(hinge.joint), toward, ..mount.clone() };
+        design.bodies.get_mut(hinge.body).into_iter().for_each(|b| b.fittings.mounts.push(mount.clone()));
+    }
 }

@@ -156,6 +156,9 @@ pub struct AssemblyExport {
     pub instance: Option<usize>,
     /// Its indices count in the instance's design.
     pub export: Export,
+    /// Of motor code for drives of several instances, their motors in the order written.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub motors: Vec<usize>,
 }
 
 /// x = rotation · X + translation; the rotation is improper for a mirror image.
@@ -253,6 +256,16 @@ impl Instance {
     }
 }
 
+impl Hinged {
+    /// Its statement.
+    pub fn origin(&self) -> Origin {
+        match &self.fitting {
+            HingeFitting::Mount(m) => m.origin,
+            HingeFitting::Horn(h) => h.origin,
+        }
+    }
+}
+
 impl Joined {
     /// Whether it has something of its own that stands in no member, besides what its members are.
     pub fn has_own(&self) -> bool {
@@ -281,7 +294,7 @@ impl Assembly {
     /// A mechanism by itself.
     pub fn of(design: Design) -> Self {
         let motors = (0..design.drives.len()).map(|drive| InstanceDrive { instance: 0, drive }).collect();
-        let export = |e: &Export| AssemblyExport { instance: Some(0), export: e.clone() };
+        let export = |e: &Export| AssemblyExport { instance: Some(0), export: e.clone(), motors: Vec::new() };
         Self {
             name: design.name.clone(),
             instances: vec![Instance {

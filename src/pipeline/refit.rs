@@ -2,6 +2,7 @@
 //! they stood in the mechanism. The design that is solved knows nothing of them.
 
 use super::joined::Known;
+use crate::diagnostic::Origin;
 use crate::equilibrium::{Layout, Model};
 use crate::geometry::link::BodyPlan;
 use crate::geometry::parts::groups;
@@ -34,9 +35,14 @@ struct Shape {
 }
 
 impl Shape {
-    fn new(design: &Design, values: &[f64]) -> Result<Self, GeometryError> {
+    fn new(design: &Design, values: &[f64], put_on: &[Origin]) -> Result<Self, GeometryError> {
         // How it changes with its free variables is of no interest any more, and costs most.
         let mut design = design.clone();
+        // What stands in the design as well is put on anew, in its place.
+        for body in &mut design.bodies {
+            body.fittings.mounts.retain(|m| !put_on.contains(&m.origin));
+            body.fittings.horns.retain(|h| !put_on.contains(&h.origin));
+        }
         design.exprs.nodes = design.exprs.values(values).into_iter().map(Node::Const).collect();
         let motion = solve_motion(&design, values).map_err(|_| lost(&design))?;
         let layout = Layout::new(&design, &motion, values);
@@ -109,7 +115,8 @@ fn refit(
     with_carving: bool,
 ) -> Result<Refitted, GeometryError> {
     let places = assembly.places(|d| designs.get(d).map(|k| k.values));
-    let mut shape = Shape::new(design, known.values)?;
+    let put_on: Vec<Origin> = assembly.hinged(index).map(Hinged::origin).collect();
+    let mut shape = Shape::new(design, known.values, &put_on)?;
     for hinged in assembly.hinged(index) {
         for hinge in hinged.hinges.iter().filter(|h| h.instance == index) {
             match &hinged.fitting {
@@ -133,17 +140,21 @@ fn refit(
     let input = PartsInput { bodies, ..known.input.clone() };
     let plans = plan_bodies(&input)?;
     let carving = if with_carving { carve(&input, &plans, known.states)? } else { Carving::default() };
-    let named = |f: &FitFault| {
-        assembly.hinged(index).any(|h| {
-            let origin = match &h.fitting {
-                HingeFitting::Mount(m) => m.origin,
-                HingeFitting::Horn(h) => h.origin,
-            };
-            origin == f.origin && h.hinges.first().is_some_and(|h| h.instance == index)
+    // What stands in the design is told of the design.
+    let in_design = |f: &FitFault| {
+        let mut fittings = design.bodies.iter().map(|b| &b.fittings);
+        fittings.any(|t| {
+            t.mounts.iter().map(|m| m.origin).chain(t.horns.iter().map(|h| h.origin)).any(|o| o == f.origin)
         })
     };
+    let named = |f: &FitFault| {
+        assembly
+            .hinged(index)
+            .any(|h| h.origin() == f.origin && h.hinges.first().is_some_and(|h| h.instance == index))
+    };
     let faults = plans.iter().flat_map(|p| p.faults.iter().cloned());
-    let faults = faults.chain(out_of_reach(&plans, &groups(&input))).filter(named).collect();
+    let faults = faults.chain(out_of_reach(&plans, &groups(&input)));
+    let faults = faults.filter(|f| named(f) && !in_design(f)).collect();
     Ok(Refitted { input, plans, carving, faults })
 }
 
@@ -160,7 +171,8 @@ fn mounted(
     let (design, known) = (assembly.designs.get(instance.design)?, designs.get(instance.design)?);
     let placement = &instance.placement;
     let solid = || {
-        let mut shape = Shape::new(design, known.values)?;
+        let put_on: Vec<Origin> = assembly.hinged(hinge.instance).map(Hinged::origin).collect();
+        let mut shape = Shape::new(design, known.values, &put_on)?;
         let along = mount.along.map(|d| placement.direction_within(&Vector3::from(d)));
         let toward = mount.toward.map(|q| placement.point_within(&places.at(q)));
         shape.mount(mount, hinge, along, toward);
