@@ -181,10 +181,10 @@ impl<'a> Evaluator<'a> {
                 }
                 StatementKind::Plate(_) => {
                     let message = "`plate` beside instances is not available yet";
-                    let help = "write it in the mechanism that is placed: every copy then has its own";
+                    let help = "write it in the mechanism that is placed, or unite a slab with the ground: `solid \"slab.stl\" on GROUND`";
                     self.out.push(
                         Diagnostic::error(codes::LATER_STATEMENT, message, s.at)
-                            .label("a plate lies in a layer, and layers are those of mechanisms")
+                            .label("a plate lies in a layer, and those of several instances have no plane in common")
                             .help(help),
                     );
                     continue;
