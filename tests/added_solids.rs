@@ -266,9 +266,3 @@ fn a_ground_of_instances_carries_holes_motors_and_solids() {
     let sheet = String::from_utf8(sheet.bytes.clone()).unwrap();
     assert!(sheet.contains("nema17") && sheet.contains("screw"), "{sheet}");
 }
-
-#[test]
-fn a_motor_of_an_instances_hinge_belongs_into_its_mechanism() {
-    let found = told(&pair("mount nema17 on board at (0 mm, 0 mm)"), "E0463");
-    assert!(found[0].contains("`one.motor` has to be mounted in `nodder` itself"), "{found:?}");
-}

@@ -273,7 +273,8 @@ fn a_lock_outlives_a_mount() {
     };
     let apart = "\n    collision(gap = 0.5 mm)\n";
     // Also where its place is of numbers that the design has nowhere else.
-    let places = ["mount sg90 on base at O + (1.7 mm, 2.3 mm, 0 mm)", "hole 3.3 mm on base at (-7.1 mm, 3.9 mm)"];
+    let places =
+        ["mount sg90 on base at O + (1.7 mm, 2.3 mm, 0 mm)", "hole 3.3 mm on base at (-7.1 mm, 3.9 mm)"];
     for fit in places.into_iter().chain([fit]) {
         assert_eq!(digest("", ""), digest(fit, ""), "{fit}");
         assert_ne!(digest("", apart), digest(fit, apart), "{fit}");

@@ -100,6 +100,8 @@ pub struct Evaluator<'a> {
     pub(super) as_is: bool,
     /// What names came to in the mechanisms that this one places.
     pub(super) placed_values: Vec<super::KnownValue>,
+    /// Instances whose points can be named.
+    pub(super) drawn: super::drawn::Drawings,
 }
 
 impl<'a> Evaluator<'a> {
@@ -130,6 +132,7 @@ impl<'a> Evaluator<'a> {
             starts: (Vec::new(), Vec::new()),
             scale: 1.0,
             placed_values: Vec::new(),
+            drawn: Default::default(),
             as_is: false,
         }
     }
@@ -278,6 +281,9 @@ impl<'a> Evaluator<'a> {
             && rest.is_empty()
         {
             return Ok(Value::Scalar(Scalar { id, dim: Dimension::NUMBER }));
+        }
+        if let Some(point) = self.instance_point(env.scope, path, at) {
+            return point;
         }
         let mut value = self.lookup(env.scope, first)?;
         let mut so_far = first.node.clone();

@@ -62,7 +62,9 @@ impl<'a> Evaluator<'a> {
         let Given { along, toward, clearance_mm, thick: thick_mm, .. } = given;
         if let Some(q) = toward {
             let (p, q) = (self.start_point(position), self.start_point(q));
-            let axis = along.or(joint.and_then(|j| Some(s.joints.get(j)?.axis))).unwrap_or([0.0, 0.0, 1.0]);
+            let hinge = joint
+                .and_then(|j| s.joints.get(j).map(|j| j.axis).or_else(|| s.standing.get(j).map(|h| h.axis)));
+            let axis = along.or(hinge).unwrap_or([0.0, 0.0, 1.0]);
             let d = [q[0] - p[0], q[1] - p[1], q[2] - p[2]];
             let up: f64 = d.iter().zip(axis).map(|(d, a)| d * a).sum();
             let off = d.iter().zip(axis).map(|(d, a)| (d - a * up).powi(2)).sum::<f64>().sqrt();
@@ -78,7 +80,7 @@ impl<'a> Evaluator<'a> {
         Ok((body, Mount { motor, position, along, joint, toward, thick_mm, clearance_mm, origin: at }))
     }
 
-    fn horn(
+    pub(super) fn horn(
         &mut self,
         scope: usize,
         module: usize,
@@ -169,7 +171,7 @@ impl<'a> Evaluator<'a> {
         Ok(())
     }
 
-    /// The conventional hinge of a body at a point.
+    /// The conventional hinge of a body at a point: beside instances one of those that stand there.
     fn turned_at(&self, body: usize, at: ExprPoint, s: &Structure<'a>) -> Option<JointId> {
         let at = self.start_point(at);
         let near = |p: [f64; 3]| p.iter().zip(at).all(|(p, q)| (p - q).abs() < SAME_POINT_MM);
@@ -183,7 +185,8 @@ impl<'a> Evaluator<'a> {
                     && near(self.start_point(joint.point))
             })
         };
-        (0..s.joints.len()).find(|j| is(*j))
+        let standing = || s.standing.iter().position(|h| h.body == body && near(h.at));
+        (0..s.joints.len()).find(|j| is(*j)).or_else(standing)
     }
 }
 

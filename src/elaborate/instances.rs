@@ -2,6 +2,7 @@
 
 use super::codes;
 use super::dimension::Dimension;
+use super::drawn::{Drawn, Places};
 use super::eval::{Env, Evaluator, Failed, Outcome};
 use super::given::{Given, GivenKey};
 use super::load::Program;
@@ -14,9 +15,10 @@ use super::settings::Settings;
 use super::sheet::Sheet;
 use crate::diagnostic::{Diagnostic, Origin};
 use crate::ir::assembly::{AssemblyExport, AssemblyRequirement, InstanceDrive, Joined, PlacedDrive};
-use crate::ir::{Assembly, Design, Export, ExportKind, Instance, JointKind, Placement};
+use crate::ir::{Assembly, CodeKind, Design, Export, ExportKind, ExprPoint, Instance, JointKind, Placement};
 use crate::syntax::ast::{self, Expr, Ident, Item, Mechanism, StatementKind};
 use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
 
 /// Whether a mechanism is made of others.
 pub fn is_assembly(m: &Mechanism) -> bool {
@@ -72,8 +74,8 @@ impl Parts {
             Some(group) => group.members.push(second),
             None => {
                 let members = first.into_iter().chain([second]).collect();
-                let (skeleton, holes, fittings) = Default::default();
-                self.joined.push(Joined { name, members, skeleton, holes, fittings, origin: at });
+                let (skeleton, holes, fittings, hinged) = Default::default();
+                self.joined.push(Joined { name, members, skeleton, holes, fittings, hinged, origin: at });
             }
         }
     }
@@ -115,8 +117,6 @@ impl<'a> Evaluator<'a> {
     ) -> Option<Assembly> {
         let scope = self.scope(outside.module);
         let sheet = self.sheet(scope, m);
-        self.force_all(scope);
-        self.assertions(scope, &sheet);
         self.only_instances(&sheet, m);
         let grounds: BTreeSet<&str> = sheet.bodies.iter().map(|b| b.name.node.as_str()).collect();
         let mut parts = Parts::default();
@@ -125,10 +125,19 @@ impl<'a> Evaluator<'a> {
             if self.put(scope, place, *at, outside, &grounds, &mut parts).is_err() {
                 parts.failed.insert(place.name.node.clone());
             }
+            self.stands(&place.name, &parts);
         }
         self.mirrors(&sheet, &mut parts);
-        self.own_shapes(scope, &sheet, &mut parts);
-        let exprs = self.own_fittings(scope, &sheet, &mut parts, outside);
+        for (mirror, _) in &sheet.mirrors {
+            self.stands(&mirror.name, &parts);
+        }
+        // Names may mean points of instances.
+        self.force_all(scope);
+        self.assertions(scope, &sheet);
+        let mut places = Places::default();
+        self.own_shapes(scope, &sheet, &mut parts, &mut places);
+        self.own_fittings(scope, &sheet, &mut parts, outside, &mut places);
+        let Places { exprs, free } = places;
         self.same_cycles(&parts);
         self.same_stuff(&parts);
         let requirements = queries
@@ -137,7 +146,7 @@ impl<'a> Evaluator<'a> {
             .filter_map(|q| self.instance_requirement(scope, q, &parts, outside).ok())
             .collect();
         let exports =
-            queries.exports.iter().filter_map(|q| self.instance_export(scope, q, &parts).ok()).collect();
+            queries.exports.iter().filter_map(|q| self.export_of_all(scope, q, &parts).ok()).collect();
         let Parts { designs, instances, joined, motors, .. } = parts;
         let name = m.name.node.clone();
         Some(Assembly {
@@ -149,6 +158,7 @@ impl<'a> Evaluator<'a> {
             requirements,
             exports,
             exprs,
+            free,
             origin: m.name.at,
         })
     }
@@ -169,17 +179,13 @@ impl<'a> Evaluator<'a> {
                     );
                     continue;
                 }
-                StatementKind::Horn(_) | StatementKind::Plate(_) => {
-                    let (what, label) = match &s.kind {
-                        StatementKind::Horn(_) => {
-                            ("horn", "a horn sits on a hinge, and hinges stand in mechanisms")
-                        }
-                        _ => ("plate", "a plate lies in a layer, and layers are those of mechanisms"),
-                    };
-                    let message = format!("`{what}` beside instances is not available yet");
-                    let help = "write it in the mechanism that is placed: every copy then has its own";
+                StatementKind::Plate(_) => {
+                    let message = "`plate` beside instances is not available yet";
+                    let help = "write it in the mechanism that is placed, or unite a slab with the ground: `solid \"slab.stl\" on GROUND`";
                     self.out.push(
-                        Diagnostic::error(codes::LATER_STATEMENT, message, s.at).label(label).help(help),
+                        Diagnostic::error(codes::LATER_STATEMENT, message, s.at)
+                            .label("a plate lies in a layer, and those of several instances have no plane in common")
+                            .help(help),
                     );
                     continue;
                 }
@@ -214,18 +220,11 @@ impl<'a> Evaluator<'a> {
     }
 
     /// The points of grounds of the assembly's own: what they reach beside what is merged into them.
-    fn own_shapes(&mut self, scope: usize, sheet: &Sheet<'a>, parts: &mut Parts) {
+    fn own_shapes(&mut self, scope: usize, sheet: &Sheet<'a>, parts: &mut Parts, places: &mut Places) {
         for text in sheet.bodies.iter().filter(|b| b.ground && !b.points.is_empty()) {
             let Ok(body) = self.body(scope, text) else { continue };
-            let what = "a point of a ground beside instances";
-            let points = body.skeleton.iter().map(|p| {
-                let mut at = [0.0; 3];
-                for (slot, id) in at.iter_mut().zip(p.position) {
-                    *slot = self.fixed(id, text.at, what)?;
-                }
-                Ok(at)
-            });
-            let Ok(points) = points.collect::<Outcome<Vec<[f64; 3]>>>() else { continue };
+            let points = body.skeleton.iter().map(|p| self.standing_place(p.position, text.at, places));
+            let Ok(points) = points.collect::<Outcome<Vec<ExprPoint>>>() else { continue };
             match parts.joined.iter_mut().find(|j| j.name == body.name) {
                 Some(joined) => (joined.skeleton, joined.origin) = (points, text.at),
                 // A `place` that went wrong may have been the one.
@@ -238,6 +237,18 @@ impl<'a> Evaluator<'a> {
                     )
                     .help(format!("write `place … merging GROUND into {}`", body.name)),
                 ),
+            }
+        }
+    }
+
+    /// From now on an instance's points can be named.
+    fn stands(&mut self, name: &Ident, parts: &Parts) {
+        match parts.instance(&name.node).and_then(|i| parts.instances.get(i)) {
+            Some(i) if !parts.failed.contains(&name.node) => {
+                self.drawn.placed.insert(i.name.clone(), (i.design, i.placement));
+            }
+            _ => {
+                self.drawn.failed.insert(name.node.clone());
             }
         }
     }
@@ -362,6 +373,8 @@ impl<'a> Evaluator<'a> {
         self.out.append(&mut inner.out);
         self.used.append(&mut inner.used);
         let mut design = made.filter(|_| !bad)?;
+        let drawn = Drawn::of(&mut inner, &design.free);
+        self.drawn.of.push(Rc::new(drawn));
         if scale != 1.0 || !given.is_empty() {
             design.name = instance.node.clone();
         }
@@ -539,6 +552,44 @@ impl<'a> Evaluator<'a> {
         Ok(AssemblyRequirement { instance, requirement })
     }
 
+    /// An export; one of drives of several instances is put together of those of each.
+    fn export_of_all(
+        &mut self,
+        scope: usize,
+        each: &'a [Query<Expr>],
+        parts: &Parts,
+    ) -> Outcome<AssemblyExport> {
+        if let [one] = each {
+            return self.instance_export(scope, one, parts);
+        }
+        // All are looked at before any of them fails.
+        let found: Vec<Outcome<AssemblyExport>> =
+            each.iter().map(|q| self.instance_export(scope, q, parts)).collect();
+        let found = found.into_iter().collect::<Outcome<Vec<AssemblyExport>>>()?;
+        let (mut motors, mut code) = (Vec::new(), None);
+        for one in &found {
+            let (kind, drives) = match &one.export.kind {
+                ExportKind::Arduino(drive) => (CodeKind::Arduino, vec![*drive]),
+                ExportKind::Code(kind, drives) => (*kind, drives.clone()),
+                _ => return Err(Failed),
+            };
+            code = Some(kind);
+            let instance = one.instance.and_then(|i| parts.instances.get(i)).ok_or(Failed)?;
+            // Without a drive, all of the instance.
+            let all = || (0..instance.drives.len()).collect();
+            let drives: Vec<usize> = if drives.is_empty() { all() } else { drives };
+            for motor in drives.iter().filter_map(|d| instance.drives.get(*d)).map(|d| d.motor) {
+                // One that instances have in common is there once.
+                if !motors.contains(&motor) {
+                    motors.push(motor);
+                }
+            }
+        }
+        let kind = ExportKind::Code(code.ok_or(Failed)?, Vec::new());
+        let origin = each.first().map(|q| q.at).unwrap_or_default();
+        Ok(AssemblyExport { instance: None, export: Export { kind, origin }, motors })
+    }
+
     fn instance_export(
         &mut self,
         scope: usize,
@@ -560,6 +611,6 @@ impl<'a> Evaluator<'a> {
         {
             (instance, *drive) = (Some(motor.instance), motor.drive);
         }
-        Ok(AssemblyExport { instance, export: Export { origin: query.at, ..export } })
+        Ok(AssemblyExport { instance, export: Export { origin: query.at, ..export }, motors: Vec::new() })
     }
 }

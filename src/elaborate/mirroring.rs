@@ -259,6 +259,8 @@ impl<'a> Evaluator<'a> {
         }
         parts.designs.push(other);
         parts.items.extend(parts.items.get(source.design).copied());
+        let drawn = self.drawn.of.get(source.design).cloned();
+        self.drawn.of.extend(drawn);
         let index = parts.designs.len() - 1;
         parts.turned.insert(key, index);
         Ok((index, Vec::new()))

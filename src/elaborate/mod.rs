@@ -10,6 +10,7 @@ mod cases;
 mod check;
 pub mod codes;
 pub mod dimension;
+mod drawn;
 mod drives;
 mod eval;
 mod fittings;

@@ -22,8 +22,8 @@ pub struct Query<T> {
 pub struct Queries {
     /// Left side, comparison, right side.
     pub requires: Vec<Query<(Expr, ast::Compare, Expr)>>,
-    /// Each export.
-    pub exports: Vec<Query<Expr>>,
+    /// Each export; one of drives of several instances as that of each drive.
+    pub exports: Vec<Vec<Query<Expr>>>,
 }
 
 impl Queries {
@@ -50,9 +50,22 @@ impl Queries {
                     out.requires.push(Query { instances: found, text, at: s.at, turn });
                 }
                 StatementKind::Export(list) => out.exports.extend(list.iter().map(|e| {
-                    let mut found = Vec::new();
-                    let text = stripped(e, &names, &mut found);
-                    Query { instances: found, text, at: e.at, turn: turn.clone() }
+                    let query = |e: &Expr| {
+                        let mut found = Vec::new();
+                        let text = stripped(e, &names, &mut found);
+                        Query { instances: found, text, at: e.at, turn: turn.clone() }
+                    };
+                    let whole = query(e);
+                    match &e.kind {
+                        ExprKind::Call { function, arguments } if whole.instances.len() > 1 => {
+                            let alone = |a: &Argument| {
+                                let (function, arguments) = (function.clone(), vec![a.clone()]);
+                                query(&Expr { kind: ExprKind::Call { function, arguments }, at: e.at })
+                            };
+                            arguments.iter().map(alone).collect()
+                        }
+                        _ => vec![whole],
+                    }
                 })),
                 _ => {}
             }

@@ -33,6 +33,20 @@ pub struct Structure<'a> {
     pub incomplete: bool,
     /// The statement of each joint.
     pub texts: Vec<&'a ast::Joint>,
+    /// Beside instances, in place of joints: those that a motor could turn.
+    pub standing: Vec<StandingHinge>,
+}
+
+/// A conventional hinge of an instance, at the start of what is free.
+pub struct StandingHinge {
+    /// The joined body that it is seen from.
+    pub body: usize,
+    /// Its point, mm.
+    pub at: [f64; 3],
+    /// Its axis.
+    pub axis: [f64; 3],
+    /// What it is there.
+    pub of: crate::ir::assembly::InstanceHinge,
 }
 
 impl<'a> Evaluator<'a> {

@@ -281,7 +281,7 @@ fn towards_others(design: &Design, layout: &Layout, joint: &Joint, body: BodyId)
 
 /// Screws of motors to which no driver reaches, because something that is printed in one piece with the motor's body stands over them
 /// in the rest pose.
-pub(super) fn out_of_reach(plans: &[BodyPlan], groups: &[Vec<usize>]) -> Vec<FitFault> {
+pub fn out_of_reach(plans: &[BodyPlan], groups: &[Vec<usize>]) -> Vec<FitFault> {
     let mut found: Vec<FitFault> = Vec::new();
     for group in groups {
         for body in group {

@@ -389,10 +389,10 @@ impl Whole {
         fusions(&self.input, &self.plans, &self.groups(), &self.carving)
     }
 
-    /// Gaps over the cycle of everything that two instances take part in.
-    pub fn gaps(&self) -> CycleGaps {
+    /// Gaps over the cycle of everything that two instances take part in, or one that is not `known` by its design.
+    pub fn gaps(&self, known: impl Fn(usize) -> bool + Sync) -> CycleGaps {
         let within = |a: Member, b: Member| match (self.owners(a).as_slice(), self.owners(b).as_slice()) {
-            ([i], [j]) => i == j,
+            ([i], [j]) => i == j && known(*i),
             _ => false,
         };
         carved_cycle_gaps(&self.plans, &self.states, &self.carving, self.input.clearance_mm, within)

@@ -69,7 +69,7 @@ pub use carve::{Carving, Cut, carve};
 pub use check::{MeshFacts, check_mesh};
 pub use cycle::{CycleGaps, LeastGap, MovedState, carved_cycle_gaps, cycle_gaps};
 pub use fillet::Fillet;
-pub use fitted::{FitFault, FitFaultKind, MountSolid, Pocket, SeatSolid};
+pub use fitted::{FitFault, FitFaultKind, MountSolid, Pocket, SeatSolid, out_of_reach};
 pub use gap::{Fusion, Member};
 pub use input::{flexure_solid, parts_input};
 pub use lie::{Lying, Posture, lie};

@@ -3,7 +3,8 @@
 
 use super::expr::{ExprGraph, Node};
 use super::{
-    BodyId, Design, Drive, Export, ExprPoint, Fittings, Hole, JointKind, Origin, Profile, Requirement,
+    BodyId, Design, Drive, Export, ExprPoint, Fittings, Hole, Horn, JointId, JointKind, Mount, Origin,
+    Profile, Requirement,
 };
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -26,9 +27,12 @@ pub struct Assembly {
     pub requirements: Vec<AssemblyRequirement>,
     /// Files to emit.
     pub exports: Vec<AssemblyExport>,
-    /// Places of what is fitted to joined bodies: constants.
+    /// Places of what is fitted to joined bodies.
     #[serde(default)]
     pub exprs: ExprGraph,
+    /// The free variables in [`Assembly::exprs`]: places at points of instances move with what is optimised there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub free: Vec<DesignFree>,
     /// The declaration.
     pub origin: Origin,
 }
@@ -60,6 +64,49 @@ pub struct PlacedDrive {
     pub sign: f64,
 }
 
+/// A free variable by its design.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DesignFree {
+    /// Index into [`Assembly::designs`].
+    pub design: usize,
+    /// Index into its free variables.
+    pub free: usize,
+}
+
+/// Values of [`Assembly::exprs`].
+#[derive(Clone, Debug)]
+pub struct Places(Vec<f64>);
+
+/// A conventional hinge of an instance, and one of its bodies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InstanceHinge {
+    /// Index into [`Assembly::instances`].
+    pub instance: usize,
+    /// The joint, in the instance's design.
+    pub joint: JointId,
+    /// The body, likewise.
+    pub body: BodyId,
+}
+
+/// What stands on hinges of instances, written beside them: it is there once, in the place of all of them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Hinged {
+    /// That of the instance that is named, and those that lie in the same place.
+    pub hinges: Vec<InstanceHinge>,
+    /// What.
+    pub fitting: HingeFitting,
+}
+
+/// A motor or its horn; a [`JointId`] in it is that of the first hinge, a place one of [`Assembly::exprs`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HingeFitting {
+    /// A motor on its hinge.
+    Mount(Mount),
+    /// The seat of a horn.
+    Horn(Horn),
+}
+
 /// A drive by its instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InstanceDrive {
@@ -76,15 +123,19 @@ pub struct Joined {
     pub name: String,
     /// Instance and body.
     pub members: Vec<(usize, BodyId)>,
-    /// What the body itself reaches in the assembly, mm: joined by bars, beside the members' own shapes.
+    /// What the body itself reaches in the assembly, places in [`Assembly::exprs`]: joined by bars, beside the members' own
+    /// shapes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub skeleton: Vec<[f64; 3]>,
+    pub skeleton: Vec<ExprPoint>,
     /// Holes that it has in the assembly, their places in [`Assembly::exprs`].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub holes: Vec<Hole>,
     /// Motors and meshes that it carries in the assembly, likewise.
     #[serde(default, skip_serializing_if = "Fittings::is_empty")]
     pub fittings: Fittings,
+    /// Motors and horns on hinges of its members.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub hinged: Vec<Hinged>,
     /// The first statement that joins them.
     pub origin: Origin,
 }
@@ -105,6 +156,9 @@ pub struct AssemblyExport {
     pub instance: Option<usize>,
     /// Its indices count in the instance's design.
     pub export: Export,
+    /// Of motor code for drives of several instances, their motors in the order written.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub motors: Vec<usize>,
 }
 
 /// x = rotation · X + translation; the rotation is improper for a mirror image.
@@ -157,6 +211,16 @@ impl Placement {
         if *self == Self::IDENTITY { *d } else { self.matrix() * d }
     }
 
+    /// A point of the assembly, in the design's coordinates, mm.
+    pub fn point_within(&self, p: &Vector3<f64>) -> Vector3<f64> {
+        self.direction_within(&(p - Vector3::from(self.translation)))
+    }
+
+    /// A direction of the assembly, in the design's coordinates.
+    pub fn direction_within(&self, d: &Vector3<f64>) -> Vector3<f64> {
+        self.matrix().transpose() * d
+    }
+
     /// A rotation vector of the design, in the assembly, rad: a mirror turns the sense of rotations.
     pub fn turn(&self, r: &Vector3<f64>) -> Vector3<f64> {
         self.direction(r) * self.handedness()
@@ -173,6 +237,13 @@ impl Placement {
     }
 }
 
+impl Places {
+    /// A place, mm.
+    pub fn at(&self, p: ExprPoint) -> Vector3<f64> {
+        Vector3::from(p.map(|id| self.0.get(id.0 as usize).copied().unwrap_or(f64::NAN)))
+    }
+}
+
 impl Instance {
     /// The design's state at a state of the assembly.
     pub fn state(&self, state: usize) -> usize {
@@ -185,23 +256,45 @@ impl Instance {
     }
 }
 
+impl Hinged {
+    /// Its statement.
+    pub fn origin(&self) -> Origin {
+        match &self.fitting {
+            HingeFitting::Mount(m) => m.origin,
+            HingeFitting::Horn(h) => h.origin,
+        }
+    }
+}
+
 impl Joined {
-    /// Whether it has something of its own, besides what its members are.
+    /// Whether it has something of its own that stands in no member, besides what its members are.
     pub fn has_own(&self) -> bool {
         !(self.skeleton.is_empty() && self.holes.is_empty() && self.fittings.is_empty())
     }
 }
 
 impl Assembly {
-    /// The place of something that is fitted to a joined body, mm.
-    pub fn place(&self, p: ExprPoint) -> Vector3<f64> {
-        Vector3::from(p.map(|id| self.exprs.as_constant(id).unwrap_or(f64::NAN)))
+    /// All places of what is fitted to joined bodies, where designs have these values; of a design without, where they start.
+    pub fn places<'v>(&self, values: impl Fn(usize) -> Option<&'v [f64]>) -> Places {
+        let start = |f: &DesignFree| self.designs.get(f.design)?.free.get(f.free).map(|v| v.start);
+        let value = |f: &DesignFree| match values(f.design) {
+            Some(values) => values.get(f.free).copied(),
+            None => start(f),
+        };
+        let free: Vec<f64> = self.free.iter().map(|f| value(f).unwrap_or(f64::NAN)).collect();
+        Places(self.exprs.values(&free))
+    }
+
+    /// What stands on hinges of an instance.
+    pub fn hinged(&self, instance: usize) -> impl Iterator<Item = &Hinged> {
+        let of = move |h: &&Hinged| h.hinges.iter().any(|h| h.instance == instance);
+        self.joined.iter().flat_map(|j| &j.hinged).filter(of)
     }
 
     /// A mechanism by itself.
     pub fn of(design: Design) -> Self {
         let motors = (0..design.drives.len()).map(|drive| InstanceDrive { instance: 0, drive }).collect();
-        let export = |e: &Export| AssemblyExport { instance: Some(0), export: e.clone() };
+        let export = |e: &Export| AssemblyExport { instance: Some(0), export: e.clone(), motors: Vec::new() };
         Self {
             name: design.name.clone(),
             instances: vec![Instance {
@@ -216,6 +309,7 @@ impl Assembly {
             motors,
             requirements: Vec::new(),
             exprs: ExprGraph::default(),
+            free: Vec::new(),
             exports: design.exports.iter().map(export).collect(),
             origin: design.origin,
             designs: vec![design],

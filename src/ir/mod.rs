@@ -25,7 +25,7 @@ pub use model::RodModel;
 use serde::{Deserialize, Serialize};
 pub use solid::{AddedSolid, SurfaceFault, SurfaceFaultKind, TriangleMesh};
 pub use solution::Solution;
-pub(crate) use used::prune;
+pub(crate) use used::{prune, with_operands};
 
 /// Index into [`Design::bodies`].
 pub type BodyId = usize;

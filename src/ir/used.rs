@@ -21,7 +21,8 @@ impl Design {
     }
 }
 
-fn with_operands(node: &Node, f: impl Fn(ExprId) -> ExprId) -> Node {
+/// The node with other operands.
+pub(crate) fn with_operands(node: &Node, f: impl Fn(ExprId) -> ExprId) -> Node {
     match *node {
         Node::Const(v) => Node::Const(v),
         Node::Free(i) => Node::Free(i),

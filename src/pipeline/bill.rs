@@ -2,6 +2,7 @@
 
 use crate::emit::plate::Bought;
 use crate::geometry::parts::FLOOR_MM;
+use crate::ir::assembly::HingeFitting;
 use crate::ir::{Assembly, Design, HornForm, Instance, Mount, Realization};
 use nalgebra::Vector3;
 
@@ -70,12 +71,29 @@ pub fn bought(assembly: &Assembly) -> Vec<Bought> {
             bill.add("string".into(), 1, instance.of(&string.name));
         }
     }
+    let places = assembly.places(|_| None);
     for joined in &assembly.joined {
         let first = joined.members.first().and_then(|(i, _)| assembly.instances.get(*i));
         let Some(design) = first.and_then(|i| assembly.designs.get(i.design)) else { continue };
-        for mount in &joined.fittings.mounts {
-            if is_new(format!("mount {}", mount.motor.name), assembly.place(mount.position)) {
+        let hinged = joined.hinged.iter();
+        let on_hinges = hinged.clone().filter_map(|h| match &h.fitting {
+            HingeFitting::Mount(mount) => Some(mount),
+            HingeFitting::Horn(_) => None,
+        });
+        for mount in joined.fittings.mounts.iter().chain(on_hinges) {
+            if is_new(format!("mount {}", mount.motor.name), places.at(mount.position)) {
                 mounted(&mut bill, design, mount, joined.name.clone());
+            }
+        }
+        for (h, horn) in hinged.filter_map(|h| match &h.fitting {
+            HingeFitting::Horn(horn) => Some((h.hinges.first()?, horn)),
+            HingeFitting::Mount(_) => None,
+        }) {
+            let Some(instance) = assembly.instances.get(h.instance) else { continue };
+            let Some(design) = assembly.designs.get(instance.design) else { continue };
+            let Some(joint) = design.joints.get(h.joint) else { continue };
+            if is_new(format!("horn {}", horn.form.name), place(instance, design, joint.point)) {
+                seated(&mut bill, &horn.form, joined.name.clone());
             }
         }
     }

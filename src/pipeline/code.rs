@@ -58,6 +58,9 @@ fn asked(assembly: &Assembly, export: &AssemblyExport) -> Option<(CodeKind, Vec<
         ExportKind::Code(kind, drives) => (*kind, drives.clone()),
         _ => return None,
     };
+    if !export.motors.is_empty() {
+        return Some((kind, export.motors.clone()));
+    }
     let Some(instance) = export.instance.and_then(|i| assembly.instances.get(i)) else {
         return Some((kind, (0..assembly.motors.len()).collect()));
     };
@@ -71,11 +74,20 @@ fn asked(assembly: &Assembly, export: &AssemblyExport) -> Option<(CodeKind, Vec<
     Some((kind, motors))
 }
 
-/// Called after the assembly, an instance where the export is of one, and the drive where it is of one.
+/// Called after the assembly, an instance where the export is of one, and the drive where it is of one; of some instances
+/// after each of them.
 fn named(assembly: &Assembly, export: &AssemblyExport) -> String {
     let instance = export.instance.and_then(|i| assembly.instances.get(i));
     let mut parts = vec![assembly.name.clone()];
     parts.extend(instance.map(|i| plain(&i.name)).filter(|n| !n.is_empty()));
+    if export.motors.len() < assembly.motors.len() {
+        let motors = export.motors.iter().filter_map(|m| assembly.motors.get(*m));
+        for name in motors.filter_map(|m| assembly.instances.get(m.instance)).map(|i| plain(&i.name)) {
+            if !parts.contains(&name) {
+                parts.push(name);
+            }
+        }
+    }
     let only = match &export.export.kind {
         ExportKind::Arduino(drive) => Some(*drive),
         ExportKind::Code(_, drives) => drives.first().copied().filter(|_| drives.len() == 1),

@@ -158,7 +158,7 @@ impl Stages for Compiler {
     }
 
     fn between(&self, assembly: &Assembly, simulations: &[Simulation]) -> Between {
-        if assembly.instances.len() < 2 {
+        if assembly.instances.len() < 2 && assembly.hinged(0).next().is_none() {
             return Between::default();
         }
         // What fails here has failed, and is told, where the designs were simulated.
@@ -200,7 +200,7 @@ impl Stages for Compiler {
                 solids::build(design, &input, &planned, &|bodies| joined::stands_alone(assembly, d, bodies))?;
             found.extend(findings);
             moving.push(Moving::new(design, &layout, &solved, &cycle));
-            built.push(Solid { input, parts, states: planned.states.clone() });
+            built.push(Solid { input, parts, states: planned.states.clone(), values: values.clone() });
         }
         let (parts, findings) = joined::parts(assembly, &built, plans.whole.as_deref())?;
         found.extend(findings);

@@ -1,5 +1,6 @@
 //! The printed parts of an assembly: those of its designs, in the places of their instances.
 
+use super::refit::{Refitted, refitted};
 use super::report::{Place, Worst};
 use super::stages::{Between, Failed};
 use crate::diagnostic::{Diagnostic, Origin};
@@ -23,6 +24,8 @@ pub struct Solid {
     pub parts: Parts,
     /// Its states over the cycle.
     pub states: Vec<MovedState>,
+    /// Its free variables.
+    pub values: Vec<f64>,
 }
 
 /// A design as it is planned.
@@ -36,26 +39,30 @@ pub struct Planned {
     pub carving: Carving,
     /// Its states over the cycle.
     pub states: Vec<MovedState>,
+    /// Its free variables.
+    pub values: Vec<f64>,
 }
 
 /// What is known of a design.
-struct Known<'s> {
-    input: &'s PartsInput,
-    plans: &'s [BodyPlan],
-    carving: &'s Carving,
-    states: &'s [MovedState],
+pub(super) struct Known<'s> {
+    pub input: &'s PartsInput,
+    pub plans: &'s [BodyPlan],
+    pub carving: &'s Carving,
+    pub states: &'s [MovedState],
+    pub values: &'s [f64],
 }
 
 impl Solid {
     fn known(&self) -> Known<'_> {
         let Parts { plans, carving, .. } = &self.parts;
-        Known { input: &self.input, plans, carving, states: &self.states }
+        Known { input: &self.input, plans, carving, states: &self.states, values: &self.values }
     }
 }
 
 impl Planned {
     fn known(&self) -> Known<'_> {
-        Known { input: &self.input, plans: &self.plans, carving: &self.carving, states: &self.states }
+        let Self { input, plans, carving, states, values } = self;
+        Known { input, plans, carving, states, values }
     }
 }
 
@@ -125,9 +132,10 @@ pub fn parts(
     };
     let known: Vec<Known<'_>> = solids.iter().map(Solid::known).collect();
     let of_all = || failed(&assembly.name, assembly.origin);
-    let frames = frames(assembly, &known).map_err(of_all())?;
-    let whole = joined(assembly, &known, &frames, carved).map_err(of_all())?;
-    let (mut out, mut found) = (Vec::new(), seats(assembly, &frames));
+    let refits = refits(assembly, &known, carved.is_none()).map_err(of_all())?;
+    let frames = frames(assembly, &known, &refits).map_err(of_all())?;
+    let whole = joined(assembly, &known, &refits, &frames, carved).map_err(of_all())?;
+    let (mut out, mut found) = (Vec::new(), seats(assembly, &refits, &frames));
     for group in whole.groups() {
         let Some((name, at)) = name(assembly, solids, &whole, &group) else { continue };
         // Repeated instances are named with brackets, which shells and some slicers take for patterns.
@@ -163,11 +171,22 @@ pub fn parts(
     Ok((out, found))
 }
 
+/// The instances that carry something on their hinges, in solids with it.
+fn refits(
+    assembly: &Assembly,
+    designs: &[Known<'_>],
+    with_carving: bool,
+) -> Result<Vec<Option<Refitted>>, GeometryError> {
+    let instances = 0..assembly.instances.len();
+    instances.map(|i| refitted(assembly, i, designs, with_carving).transpose()).collect()
+}
+
 /// The instances as one mechanism, from what is known of each design. Bodies of the assembly with points of their own
 /// follow the instances, each as a share that stands still ([`own`]). What is `carved` need not be carved again.
 fn joined(
     assembly: &Assembly,
     designs: &[Known<'_>],
+    refits: &[Option<Refitted>],
     frames: &[(&Joined, Frame)],
     carved: Option<&Carving>,
 ) -> Result<Whole, GeometryError> {
@@ -175,7 +194,13 @@ fn joined(
     let mut count = 0;
     let mut shares = Vec::new();
     for (i, instance) in assembly.instances.iter().enumerate() {
-        let Some(Known { input, plans, carving, states }) = designs.get(instance.design) else { continue };
+        let Some(&Known { mut input, mut plans, mut carving, states, .. }) = designs.get(instance.design)
+        else {
+            continue;
+        };
+        if let Some(Some(refit)) = refits.get(i) {
+            (input, plans, carving) = (&refit.input, &refit.plans, &refit.carving);
+        }
         let mut number = |b: usize| {
             let common = joint_body(assembly, i, b);
             let met = common.and_then(|j| known.iter().find(|k| k.0 == j));
@@ -202,8 +227,9 @@ fn joined(
 fn frames<'a>(
     assembly: &'a Assembly,
     designs: &[Known<'_>],
+    refits: &[Option<Refitted>],
 ) -> Result<Vec<(&'a Joined, Frame)>, GeometryError> {
-    let planned = |j: &'a Joined| Some(frame(assembly, j, designs)?.map(|frame| (j, frame)));
+    let planned = |j: &'a Joined| Some(frame(assembly, j, designs, refits)?.map(|frame| (j, frame)));
     own(assembly).filter_map(planned).collect()
 }
 
@@ -212,17 +238,20 @@ fn frame(
     assembly: &Assembly,
     joined: &Joined,
     designs: &[Known<'_>],
+    refits: &[Option<Refitted>],
 ) -> Option<Result<Frame, GeometryError>> {
+    let places = assembly.places(|d| designs.get(d).map(|k| k.values));
     let of = |i: usize| assembly.instances.get(i).and_then(|n| Some((n, designs.get(n.design)?)));
     let (_, like) = joined.members.first().and_then(|(i, _)| of(*i))?;
-    let skeleton: Vec<Vector3<f64>> = joined.skeleton.iter().map(|p| Vector3::from(*p)).collect();
-    let (placed, turned) = (|p| assembly.place(p), |d: &Vector3<f64>| *d);
+    let skeleton: Vec<Vector3<f64>> = joined.skeleton.iter().map(|p| places.at(*p)).collect();
+    let (placed, turned) = (|p| places.at(p), |d: &Vector3<f64>| *d);
     let holes: Vec<HoleSolid> = joined.holes.iter().map(|h| HoleSolid::of(h, placed, turned)).collect();
     // Without points of its own, what is fitted is joined to the nearest place of the members.
     let nearest = |at: &Vector3<f64>| {
         let plans = joined.members.iter().filter_map(|(i, b)| {
             let (instance, known) = of(*i)?;
-            Some((instance.placement, known.plans.get(*b)?))
+            let plans = refits.get(*i).and_then(Option::as_ref).map_or(known.plans, |r| &r.plans);
+            Some((instance.placement, plans.get(*b)?))
         });
         let places = plans.flat_map(|(p, plan)| {
             plan.slots.iter().flat_map(move |(_, s)| [p.point(&s.start), p.point(&s.end)])
@@ -235,8 +264,8 @@ fn frame(
     };
     let sizes = [like.input.height_mm, like.input.clearance_mm];
     let mount = |m: &crate::ir::Mount| {
-        let at = assembly.place(m.position);
-        MountSolid::standing(m, at, m.toward.map(|q| assembly.place(q)), rest(&at), sizes)
+        let at = places.at(m.position);
+        MountSolid::standing(m, at, m.toward.map(|q| places.at(q)), rest(&at), sizes)
     };
     let mounts: Vec<MountSolid> = joined.fittings.mounts.iter().map(mount).collect();
     let solids = joined.fittings.solids.iter().map(|s| PlacedSolid::of(s, placed, turned));
@@ -254,9 +283,13 @@ fn frame(
     Some(Frame::new(body, like.input))
 }
 
-/// What is wrong with motors on bodies of the assembly's own.
-fn seats(assembly: &Assembly, frames: &[(&Joined, Frame)]) -> Vec<Diagnostic> {
+/// What is wrong with motors on bodies of the assembly's own, and on hinges of instances.
+fn seats(assembly: &Assembly, refits: &[Option<Refitted>], frames: &[(&Joined, Frame)]) -> Vec<Diagnostic> {
     let mut found = Vec::new();
+    for ((_, design), refit) in assembly.placed().zip(refits) {
+        let faults = refit.iter().flat_map(|r| &r.faults);
+        found.extend(faults.map(|f| super::solids::fit_fault(design, f)));
+    }
     for (joined, frame) in frames {
         let first = joined.members.first().and_then(|(i, _)| assembly.instances.get(*i));
         let design = first.and_then(|i| assembly.designs.get(i.design));
@@ -286,7 +319,12 @@ pub fn stands_alone(assembly: &Assembly, design: usize, bodies: &[usize]) -> boo
     };
     let of_design = |(_, n): &(usize, &Instance)| n.design == design;
     let mut instances = assembly.instances.iter().enumerate().filter(of_design);
-    instances.any(|(i, _)| bodies.iter().all(|b| !common(i, *b)))
+    instances.any(|(i, _)| !is_refitted(assembly, i) && bodies.iter().all(|b| !common(i, *b)))
+}
+
+/// Whether an instance carries something on its hinges: its parts are not those of its design.
+fn is_refitted(assembly: &Assembly, instance: usize) -> bool {
+    assembly.hinged(instance).next().is_some()
 }
 
 /// The flexures between some bodies of a design.
@@ -299,7 +337,7 @@ fn flexures_of(input: &PartsInput, bodies: &[usize]) -> impl Iterator<Item = usi
 fn alone(assembly: &Assembly, solids: &[Solid], whole: &Whole, group: &[usize]) -> Option<(Mesh, Vec<Mesh>)> {
     let members: Vec<&(usize, usize)> = group.iter().filter_map(|b| whole.bodies.get(*b)).flatten().collect();
     let [(i, b), ..] = members.as_slice() else { return None };
-    if members.len() > group.len() {
+    if members.len() > group.len() || is_refitted(assembly, *i) {
         return None;
     }
     let instance = assembly.instances.get(*i)?;
@@ -357,7 +395,9 @@ fn meeting(
             }
             // A common body: what another instance has of it is in the way, or the assembly itself, which stands last.
             let other = |of: &[usize]| of.iter().rev().copied().find(|k| k != i);
-            other(&second).map(|j| (*i, j)).or_else(|| other(&first).map(|j| (j, *i)))?
+            let other = other(&second).map(|j| (*i, j)).or_else(|| other(&first).map(|j| (j, *i)));
+            // Or what stands on the instance's own hinges.
+            other.or_else(|| is_refitted(assembly, *i).then_some((*i, *i)))?
         }
     };
     Some(Meeting {
@@ -449,9 +489,10 @@ fn not_carved(assembly: &Assembly, solids: &[Solid], whole: &Whole) -> Vec<Diagn
 pub fn between(assembly: &Assembly, designs: &[&Planned]) -> Between {
     let all: Vec<Known<'_>> = designs.iter().map(|p| p.known()).collect();
     // Where no solid comes out the mesh stage says why.
-    let Ok(frames) = frames(assembly, &all) else { return Between::default() };
-    let Ok(mut whole) = joined(assembly, &all, &frames, None) else { return Between::default() };
-    let gaps = whole.gaps();
+    let Ok(refits) = refits(assembly, &all, true) else { return Between::default() };
+    let Ok(frames) = frames(assembly, &all, &refits) else { return Between::default() };
+    let Ok(mut whole) = joined(assembly, &all, &refits, &frames, None) else { return Between::default() };
+    let gaps = whole.gaps(|i| !is_refitted(assembly, i));
     let known = |i: usize, a: Member, b: Member| {
         let Some(p) = assembly.instances.get(i).and_then(|n| designs.get(n.design)) else { return false };
         let others = |x: Member, y: Member| (x, y) != (a, b) && (y, x) != (a, b);

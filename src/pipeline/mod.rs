@@ -19,6 +19,7 @@ mod parameters;
 mod products;
 mod progress;
 mod reach;
+mod refit;
 mod report;
 mod scene;
 mod solids;

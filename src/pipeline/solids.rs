@@ -162,7 +162,7 @@ pub fn states(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) ->
 /// Gaps of the planned solids over the cycle, flexures as polygons of the solver's edges (for 20 edges of 1.6 mm
 /// bent to a radius of 15 mm, 0.02 mm inside the arc), links as they are after making way for their own flexures.
 pub fn gaps(planned: &Planned) -> CycleGaps {
-    let Planned { input, plans, carving, states } = planned;
+    let Planned { input, plans, carving, states, .. } = planned;
     carved_cycle_gaps(plans, states, carving, input.clearance_mm, |_, _| false)
 }
 
@@ -177,7 +177,7 @@ pub fn outlined(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) 
         fusions: Vec::new(),
         out_of_reach: Vec::new(),
     };
-    Solid { input, parts, states: states(design, layout, model, cycle) }
+    Solid { input, parts, states: states(design, layout, model, cycle), values: model.p.clone() }
 }
 
 /// A design as it is planned; none where there are no solids to measure (the mesh stage says why): a gap of parts that
@@ -197,7 +197,7 @@ pub fn plan(design: &Design, layout: &Layout, model: &Model, cycle: &Cycle) -> R
     let plans = plan_bodies(&input).map_err(failed)?;
     let states = states(design, layout, model, cycle);
     let carving = carve(&input, &plans, &states).map_err(failed)?;
-    Ok(Planned { input, plans, carving, states })
+    Ok(Planned { input, plans, carving, states, values: model.p.clone() })
 }
 
 /// The nearest two over the whole cycle, with their gap (mm).

@@ -33,7 +33,7 @@ impl Stages for Shown {
             let report = Export { kind: ExportKind::Report, origin: assembly.origin };
             assembly.exports.retain(|e| e.export.kind == ExportKind::Report);
             if assembly.exports.is_empty() {
-                assembly.exports.push(AssemblyExport { instance: None, export: report });
+                assembly.exports.push(AssemblyExport { instance: None, export: report, motors: Vec::new() });
             }
         }
         checked
