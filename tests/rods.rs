@@ -469,7 +469,7 @@ fn short_hinge_agrees_with_shooting() {
             angle += 1;
             s.move_b(&Vector3::zeros(), &(Vector3::z() * 1f64.to_radians())).unwrap();
         }
-        let g = s.condensed().0;
+        let g = *s.condensed().0;
         let strains = s.system.strains(&s.rod);
         // Vertices 50 and 51 straddle the middle; points 0 and 16 are at ±a along m₁ = y.
         let stress = |point| {
