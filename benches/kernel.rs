@@ -4,7 +4,10 @@
 //! `cargo bench --bench kernel [-- --only rod|cycle|optimizer|path] [--design FILE.mech]`.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
-use flexura::elaborate::{FileError, Files, Options, SolidFile, elaborate};
+#[path = "../tests/common/folder.rs"]
+mod folder;
+
+use flexura::elaborate::{Options, elaborate};
 use flexura::equilibrium::{Layout, Model, SensitivityWorkspace, sweep};
 use flexura::ir::Design;
 use flexura::kinematics::solve_motion;
@@ -12,10 +15,10 @@ use flexura::optimize::{Iteration, Method, Problem, optimize};
 use flexura::pipeline::EDGES;
 use flexura::rod::single::{EndLoad, SingleRod};
 use flexura::rod::{Rod, RodMaterial, RodParameters, RodSystem, ellipse_stiffness};
+use folder::Folder;
 use nalgebra::{SVector, Vector3};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -144,19 +147,6 @@ fn adjoint() {
         }
     });
     println!("\nGradient by all rest lengths, 20 edges: {:.2} µs.", time / 200.0 * 1e6);
-}
-
-struct Folder(PathBuf);
-
-impl Files for Folder {
-    fn read(&self, path: &str) -> Result<String, FileError> {
-        std::fs::read_to_string(self.0.join(path)).map_err(|_| FileError::NotFound)
-    }
-
-    fn solid(&self, path: &str) -> Result<Arc<SolidFile>, FileError> {
-        let bytes = std::fs::read(self.0.join(path)).map_err(|_| FileError::NotFound)?;
-        Ok(Arc::new(SolidFile::new(bytes)))
-    }
 }
 
 fn design(path: &Path) -> Design {

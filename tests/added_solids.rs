@@ -3,56 +3,24 @@
 
 mod common;
 
+use common::parts;
 use flexura::elaborate::{Options, elaborate};
 use flexura::emit::lock::design_digest;
-use flexura::equilibrium::{Layout, Model};
 use flexura::geometry::{
     FitFaultKind, Member, MovedState, PartsInput, Probe, build_carved_parts, build_parts, carved_cycle_gaps,
-    check_mesh, cycle_gaps, parts_input, printed_volume_and_center,
+    check_mesh, cycle_gaps, printed_volume_and_center,
 };
 use flexura::ir::Design;
-use flexura::kinematics::solve_motion;
 use flexura::math::Pose;
 use flexura::pipeline::{self, BuildOutcome, Compiler, Request};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
-const EDGES: usize = 20;
 /// Volumes on the grid, of those of the meshes: a body with a block of 12 mm on it, measured 0.1 %.
 const WEIGHED: f64 = 0.01;
 /// Clearance of the process, mm.
 const CLEARANCE_MM: f64 = 0.5;
-
-const NODDER: &str = "use std.materials.petg
-use std.processes.fdm
-use std.flexures.crossed_leaves
-use std.motors.nema17
-mechanism nodder {
-    point O = (0 mm, 0 mm)
-    point D = (60 mm, 0 mm)
-    point A = O + polar(15 mm, 90 deg)
-    point B = (60 mm, 40 mm)
-    point P = B + (20 mm, 20 mm)
-    point X = (20 mm, -50 mm)
-    ground base    { O, D, X }  layer -2
-    link   arm     { O, A }  layer -1
-    link   coupler { A, B }
-    link   rocker  { B, D, P }
-    hinge motor: base to arm       at O  layer -1
-    hinge elbow: arm to coupler    at A  as crossed_leaves { size = 8 mm }
-    hinge knee:  coupler to rocker at B  as crossed_leaves { size = 8 mm }
-    hinge heel:  rocker to base    at D  into base toward D - (0 mm, 25 mm) as crossed_leaves { size = 8 mm }
-    //FIT
-    material petg
-    print on fdm
-    cycle 4 steps over 2 s
-    drive motor from -5 deg to 5 deg with nema17
-    trace tip = P on rocker
-    minimize { track(tip) }
-    export stl
-}
-";
 
 /// A block by half its edges, mm, as ASCII STL.
 fn block(half: [f64; 3]) -> String {
@@ -68,25 +36,22 @@ fn block(half: [f64; 3]) -> String {
     format!("solid block\n{}endsolid block\n", triangles.map(facet).collect::<String>())
 }
 
+fn nodder(fit: &str) -> String {
+    parts::nodder("nema17", fit, "", "export stl")
+}
+
 fn files(fit: &str, half: [f64; 3]) -> BTreeMap<String, String> {
-    [("main.mech", NODDER.replace("//FIT", fit)), ("block.stl", block(half))]
+    [("main.mech", nodder(fit)), ("block.stl", block(half))]
         .map(|(name, text)| (name.to_string(), text))
         .into()
 }
 
 fn design(fit: &str, half: [f64; 3]) -> Design {
-    let found = elaborate("main.mech", &files(fit, half), &Options::default());
-    assert!(found.diagnostics.iter().all(|d| !d.is_error()), "{:#?}", found.diagnostics);
-    found.design.unwrap()
+    parts::design_of(&files(fit, half))
 }
 
 fn input(fit: &str, half: [f64; 3]) -> PartsInput {
-    let design = design(fit, half);
-    let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
-    let motion = solve_motion(&design, &start).unwrap();
-    let layout = Layout::new(&design, &motion, &start);
-    let model = Model::new(&design, &layout, &start, EDGES, false).unwrap();
-    parts_input(&design, &layout, &model)
+    parts::input(&design(fit, half))
 }
 
 fn rest(input: &PartsInput) -> MovedState {
@@ -188,7 +153,7 @@ fn a_lock_outlives_a_solid_unless_it_is_weighed() {
     let heavy = format!("{fit}\n    load gravity (0, -1, 0)");
     assert_ne!(digest(&heavy, 5.0), digest(&heavy, 6.0));
     let apart = |fit: &str| {
-        let text = NODDER.replace("track(tip)", "track(tip), collision(gap = 0.5 mm)").replace("//FIT", fit);
+        let text = nodder(fit).replace("track(tip)", "track(tip), collision(gap = 0.5 mm)");
         let mut files = files("", [5.0; 3]);
         files.insert("main.mech".into(), text);
         design_digest(&elaborate("main.mech", &files, &Options::default()).design.unwrap())

@@ -6,11 +6,12 @@
 mod built;
 mod common;
 
+use common::folder::Folder;
 use flexura::diagnostic::{Diagnostic, SourceMap};
 use flexura::elaborate::{Options, elaborate};
 use flexura::emit::lock::Lock;
 use flexura::lint::{RULES, baseline::Baseline, config, explain};
-use flexura::pipeline::{self, Compiler, FileError, Files, Request};
+use flexura::pipeline::{self, Compiler, Request};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -32,14 +33,6 @@ const ANNOTATED: [&str; 2] = ["elaborate/errors", "syntax/errors"];
 
 fn tests() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests")
-}
-
-struct Folder(PathBuf);
-
-impl Files for Folder {
-    fn read(&self, path: &str) -> Result<String, FileError> {
-        std::fs::read_to_string(self.0.join(path)).map_err(|_| FileError::NotFound)
-    }
 }
 
 fn designs(folder: &str) -> Vec<String> {

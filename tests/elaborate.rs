@@ -6,6 +6,7 @@
 mod common;
 
 use common::annotated;
+use common::folder::Folder;
 use flexura::elaborate::{Elaborated, FileError, Files, Options, codes, elaborate};
 use flexura::ir::{Design, ExportKind, ObjectiveKind, Profile, Quantity, Realization, Section};
 use proptest::prelude::*;
@@ -17,15 +18,15 @@ const CHEBYSHEV: &str = include_str!("../examples/chebyshev/chebyshev.mech");
 const SAMPLE: &str = include_str!("elaborate/samples/chebyshev.mech");
 
 /// A folder of test files, with one file that is a link outward and one that is no text.
-struct Folder(PathBuf);
+struct Errors(Folder);
 
-impl Files for Folder {
+impl Files for Errors {
     fn read(&self, path: &str) -> Result<String, FileError> {
         assert!(!path.contains(".."), "a path that leaves the folder was read: {path}");
         match path {
             "link.mech" => Err(FileError::Outside),
             "binary.mech" => Err(FileError::NotText),
-            _ => std::fs::read_to_string(self.0.join(path)).map_err(|_| FileError::NotFound),
+            _ => self.0.read(path),
         }
     }
 }
@@ -61,7 +62,7 @@ fn starts(d: &Design) -> Vec<f64> {
 fn annotated_files_give_exactly_what_they_say() {
     annotated::check_folder(&errors_folder(), |path, _| {
         let name = path.file_name().unwrap().to_str().unwrap();
-        elaborate(name, &Folder(errors_folder()), &Options::default()).diagnostics
+        elaborate(name, &Errors(Folder(errors_folder())), &Options::default()).diagnostics
     });
 }
 
@@ -421,7 +422,7 @@ fn steps_can_be_given_from_outside() {
 
 #[test]
 fn imports_in_a_circle_show_the_circle() {
-    let files = Folder(errors_folder().join("lib"));
+    let files = Errors(Folder(errors_folder().join("lib")));
     let e = elaborate("ring_a.mech", &files, &Options::default());
     assert!(
         found(&e).contains(

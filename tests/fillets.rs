@@ -1,15 +1,14 @@
 //! `fillet`: roots of printed flexures are round, rods and locks are as without.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod common;
+
+use common::parts::design;
 use flexura::elaborate::{Options, elaborate};
 use flexura::emit::lock::design_digest;
-use flexura::equilibrium::{Layout, Model};
-use flexura::geometry::{Mesh, PartsInput, build_parts, check_mesh, parts_input, section};
-use flexura::ir::Design;
-use flexura::kinematics::solve_motion;
+use flexura::geometry::{Mesh, PartsInput, check_mesh, section};
 use std::collections::BTreeMap;
 
-const EDGES: usize = 20;
 /// A leaf along x from -10 mm to 10 mm, 0.8 mm thick.
 const PIVOT: &str = "edition 1
 use std.materials.rigur
@@ -55,13 +54,6 @@ fn pivot(links: &str, joint: &str) -> String {
     PIVOT.replace("//LINKS", links).replace("//JOINT", &format!("{joint} {LEAF}"))
 }
 
-fn design(text: &str) -> Design {
-    let files = BTreeMap::from([("main.mech".to_string(), text.to_string())]);
-    let found = elaborate("main.mech", &files, &Options::default());
-    assert!(found.diagnostics.iter().all(|d| !d.is_error()), "{:#?}", found.diagnostics);
-    found.design.unwrap()
-}
-
 fn codes(text: &str) -> Vec<String> {
     let files = BTreeMap::from([("main.mech".to_string(), text.to_string())]);
     let found = elaborate("main.mech", &files, &Options::default());
@@ -69,18 +61,11 @@ fn codes(text: &str) -> Vec<String> {
 }
 
 fn input(text: &str) -> PartsInput {
-    let design = design(text);
-    let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
-    let motion = solve_motion(&design, &start).unwrap();
-    let layout = Layout::new(&design, &motion, &start);
-    let model = Model::new(&design, &layout, &start, EDGES, false).unwrap();
-    parts_input(&design, &layout, &model)
+    common::parts::input(&design(text))
 }
 
 fn part(text: &str) -> Mesh {
-    let parts = build_parts(&input(text)).unwrap();
-    assert_eq!(parts.parts.len(), 1);
-    let part = parts.parts[0].mesh.clone();
+    let part = common::parts::part(text);
     let facts = check_mesh(&part);
     assert!(facts.is_printable(), "{facts:?}");
     part

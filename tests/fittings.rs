@@ -1,19 +1,16 @@
 //! `mount`, `horn` and `plate`: what is emitted fits the motor, its screws and its horn, by measures of the solids.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use flexura::elaborate::{Options, elaborate};
+mod common;
+
+use common::parts::{design, tunnels};
 use flexura::emit::lock::design_digest;
-use flexura::equilibrium::{Layout, Model};
 use flexura::geometry::{
-    Facets, Member, Mesh, MovedState, Parts, PartsInput, build_parts, check_mesh, cycle_gaps, parts_input,
+    Facets, Member, Mesh, MovedState, Parts, PartsInput, build_parts, check_mesh, cycle_gaps,
 };
-use flexura::ir::Design;
-use flexura::kinematics::solve_motion;
 use flexura::math::Pose;
 use nalgebra::Vector3;
-use std::collections::BTreeMap;
 
-const EDGES: usize = 20;
 /// Vertices are rounded to single precision, mm.
 const ROUNDING_MM: f64 = 1e-4;
 /// Edges up to 0.01 mm are collapsed, mm.
@@ -28,54 +25,12 @@ const HALF_MM: f64 = 6.0;
 /// Of the base's lower face.
 const BEHIND_MM: f64 = -2.0 * PITCH_MM - HALF_MM;
 
-const NODDER: &str = "use std.materials.petg
-use std.processes.fdm
-use std.flexures.crossed_leaves
-use std.motors.MOTOR
-mechanism nodder {
-    point O = (0 mm, 0 mm)
-    point D = (60 mm, 0 mm)
-    point A = O + polar(15 mm, 90 deg)
-    point B = (60 mm, 40 mm)
-    point P = B + (20 mm, 20 mm)
-    point X = (20 mm, -50 mm)
-    ground base    { O, D, X }  layer -2
-    link   arm     { O, A }  layer -1
-    link   coupler { A, B }
-    link   rocker  { B, D, P }
-    hinge motor: base to arm       at O  layer -1
-    hinge elbow: arm to coupler    at A  as crossed_leaves { size = 8 mm }
-    hinge knee:  coupler to rocker at B  as crossed_leaves { size = 8 mm }
-    hinge heel:  rocker to base    at D  into base toward D - (0 mm, 25 mm) as crossed_leaves { size = 8 mm }
-    //FIT
-    material petg
-    print on fdm
-    cycle 4 steps over 2 s
-    drive motor from -5 deg to 5 deg with MOTOR
-    rest motor at 0 deg
-    trace tip = P on rocker
-    minimize { track(tip) }
-}
-";
-
 fn nodder(motor: &str, fit: &str) -> String {
-    NODDER.replace("//FIT", fit).replace("MOTOR", motor)
-}
-
-fn design(text: &str) -> Design {
-    let files = BTreeMap::from([("main.mech".to_string(), text.to_string())]);
-    let found = elaborate("main.mech", &files, &Options::default());
-    assert!(found.diagnostics.iter().all(|d| !d.is_error()), "{:#?}", found.diagnostics);
-    found.design.unwrap()
+    common::parts::nodder(motor, fit, "rest motor at 0 deg", "")
 }
 
 fn input(text: &str) -> PartsInput {
-    let design = design(text);
-    let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
-    let motion = solve_motion(&design, &start).unwrap();
-    let layout = Layout::new(&design, &motion, &start);
-    let model = Model::new(&design, &layout, &start, EDGES, false).unwrap();
-    parts_input(&design, &layout, &model)
+    common::parts::input(&design(text))
 }
 
 fn parts(text: &str) -> Parts {
@@ -84,17 +39,9 @@ fn parts(text: &str) -> Parts {
 
 /// The only printed part.
 fn part(text: &str) -> Mesh {
-    let parts = parts(text);
-    assert_eq!(parts.parts.len(), 1);
-    let mesh = parts.parts[0].mesh.clone();
+    let mesh = common::parts::part(text);
     assert!(check_mesh(&mesh).is_printable(), "{text}");
     mesh
-}
-
-/// Tunnels through a closed surface of one piece, by Euler's formula.
-fn tunnels(mesh: &Mesh) -> i64 {
-    let (v, f) = (mesh.vertices.len() as i64, mesh.triangles.len() as i64);
-    (2 - (v - 3 * f / 2 + f)) / 2
 }
 
 /// Least distance of the surface's vertices between two heights from an upright line.

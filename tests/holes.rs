@@ -1,16 +1,15 @@
 //! `hole`: a tunnel of its diameter through its body, whatever the body is made of.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod common;
+
+use common::parts::{design, part};
 use flexura::elaborate::{Options, elaborate};
-use flexura::equilibrium::{Layout, Model};
-use flexura::geometry::{Mesh, build_parts, check_mesh, parts_input};
-use flexura::ir::Design;
-use flexura::kinematics::solve_motion;
+use flexura::geometry::{Mesh, check_mesh};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
 const CANTILEVER: &str = include_str!("loads/cantilever.mech");
-const EDGES: usize = 20;
 /// Vertices are rounded to single precision, mm.
 const ROUNDING_MM: f64 = 1e-4;
 /// A ball and leaves in two planes: no body lies in layers.
@@ -38,30 +37,10 @@ fn with(text: &str, holes: &str) -> String {
     text.replace("//HOLES", holes)
 }
 
-fn design(text: &str) -> Design {
-    let files = BTreeMap::from([("main.mech".to_string(), text.to_string())]);
-    let found = elaborate("main.mech", &files, &Options::default());
-    assert!(found.diagnostics.iter().all(|d| !d.is_error()), "{:#?}", found.diagnostics);
-    found.design.unwrap()
-}
-
-/// The only printed part at the design's start.
-fn part(text: &str) -> Mesh {
-    let design = design(text);
-    let start: Vec<f64> = design.free.iter().map(|f| f.start).collect();
-    let motion = solve_motion(&design, &start).unwrap();
-    let layout = Layout::new(&design, &motion, &start);
-    let model = Model::new(&design, &layout, &start, EDGES, false).unwrap();
-    let parts = build_parts(&parts_input(&design, &layout, &model)).unwrap();
-    assert_eq!(parts.parts.len(), 1);
-    parts.parts[0].mesh.clone()
-}
-
-/// Tunnels through a closed surface of one piece, by Euler's formula.
+/// Of a surface that is printable.
 fn tunnels(mesh: &Mesh) -> i64 {
     assert!(check_mesh(mesh).is_printable());
-    let (v, f) = (mesh.vertices.len() as i64, mesh.triangles.len() as i64);
-    (2 - (v - 3 * f / 2 + f)) / 2
+    common::parts::tunnels(mesh)
 }
 
 /// Least distance of the surface's vertices from a line, as far along it as a link is high.

@@ -5,7 +5,8 @@
 
 mod common;
 
-use flexura::elaborate::{FileError, Files, Options, SolidFile, elaborate};
+use common::folder::Folder;
+use flexura::elaborate::{Options, elaborate};
 use flexura::emit::lock::Lock;
 use flexura::equilibrium::{Equilibrium, Layout, Model, sweep};
 use flexura::geometry::{
@@ -20,7 +21,6 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 /// Edges of a rod in the sweep, and in the mesh.
 const EDGES: usize = 20;
@@ -38,19 +38,6 @@ const NEAR_MM: f64 = 4.0;
 /// Points round a bent flexure, and along each of its edges.
 const AROUND: u32 = 16;
 const PER_EDGE: u32 = 4;
-
-struct Folder(PathBuf);
-
-impl Files for Folder {
-    fn read(&self, path: &str) -> Result<String, FileError> {
-        std::fs::read_to_string(self.0.join(path)).map_err(|_| FileError::NotFound)
-    }
-
-    fn solid(&self, path: &str) -> Result<Arc<SolidFile>, FileError> {
-        let bytes = std::fs::read(self.0.join(path)).map_err(|_| FileError::NotFound)?;
-        Ok(Arc::new(SolidFile::new(bytes)))
-    }
-}
 
 /// A design of an example, solved, over its cycle.
 struct Solved {

@@ -1,31 +1,21 @@
 //! The six mechanisms of the examples, from disk.
 
-use flexura::elaborate::{FileError, Files, Options, SolidFile, elaborate};
+#[path = "../../tests/common/folder.rs"]
+mod folder;
+
+use flexura::elaborate::{Options, elaborate};
 use flexura::emit::lock::Lock;
 use flexura::equilibrium::Layout;
 use flexura::ir::{Assembly, Design};
 use flexura::kinematics::solve_motion;
+use folder::Folder;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 pub const NAMES: [&str; 6] = ["chebyshev", "jansen", "car", "dragon", "eye", "hand"];
 /// Those and Chebyshev's linkage with every term of the paper: what is optimised.
 pub const OPTIMISED: [&str; 7] =
     ["chebyshev", "chebyshev_all_terms", "jansen", "car", "dragon", "eye", "hand"];
-
-struct Folder(PathBuf);
-
-impl Files for Folder {
-    fn read(&self, path: &str) -> Result<String, FileError> {
-        std::fs::read_to_string(self.0.join(path)).map_err(|_| FileError::NotFound)
-    }
-
-    fn solid(&self, path: &str) -> Result<Arc<SolidFile>, FileError> {
-        let bytes = std::fs::read(self.0.join(path)).map_err(|_| FileError::NotFound)?;
-        Ok(Arc::new(SolidFile::new(bytes)))
-    }
-}
 
 /// An example as it is written.
 pub fn example(name: &str) -> Assembly {

@@ -2,7 +2,9 @@
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 pub mod annotated;
+pub mod folder;
 pub mod gradient;
+pub mod parts;
 
 use flexura::elaborate::{FileError, Files};
 use flexura::ir::Design;
