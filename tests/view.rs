@@ -55,7 +55,15 @@ struct Answer {
 
 impl View {
     fn of(text: &str) -> Self {
+        Self::configured(text, "")
+    }
+
+    /// With a configuration beside the design.
+    fn configured(text: &str, config: &str) -> Self {
         let dir = tempfile::tempdir().unwrap();
+        if !config.is_empty() {
+            std::fs::write(dir.path().join("flexura.toml"), config).unwrap();
+        }
         std::fs::write(dir.path().join("flap.mech"), text).unwrap();
         std::fs::write(dir.path().join("secret.txt"), "a secret").unwrap();
         let mut child = Command::new(env!("CARGO_BIN_EXE_flexura"))
@@ -323,16 +331,41 @@ fn saves_errors_and_sliders_arrive() {
     assert_eq!(names.len(), 2, "nothing is written but a lock: {names:?}");
 }
 
+/// Something to optimise, over so many steps.
+fn optimised(mm: u32, steps: usize) -> String {
+    let text = with_reach(f64::from(mm)).replace("cycle 4 steps", &format!("cycle {steps} steps"));
+    let (body, _) = text.rsplit_once('}').unwrap();
+    format!(
+        "{body}    minimize {{ track(tip), stress(below = 0.1 MPa), torque(bend, scale = 0.01 N*mm) }}\n}}\n"
+    )
+}
+
+/// `[build]` of the configuration counts as it does for `build`, and so do its mistakes.
+#[test]
+fn the_configuration_counts() {
+    let solved = |config: &str| {
+        let view = View::configured(&optimised(30, 4), config);
+        let done = |s: &Value| s["phase"] == "" && s["stale"] == false && s["solving"]["running"] == false;
+        let state = view.until("it is solved", done);
+        let points = state["solving"]["points"].as_array().unwrap();
+        points.iter().map(|p| p["n"].as_u64().unwrap()).max().unwrap()
+    };
+    assert!(solved("") > 1, "by itself it takes longer");
+    assert_eq!(solved("[build]\niterations = 1\nthreads = 1\n"), 1);
+
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("flap.mech"), FLAP).unwrap();
+    std::fs::write(dir.path().join("flexura.toml"), "[build]\niterations = -1\n").unwrap();
+    let mut refused = Command::new(env!("CARGO_BIN_EXE_flexura"));
+    let refused = refused.args(["view", "flap.mech"]).current_dir(dir.path()).output().unwrap();
+    let told = String::from_utf8_lossy(&refused.stderr);
+    assert!(!refused.status.success() && told.contains("E0740"), "{told}");
+}
+
 /// The optimiser's progress is told, a newer save ends it, and what was found until then is where the next one begins.
 #[test]
 fn a_save_ends_an_optimisation() {
-    let slow = |mm: u32| {
-        let text = with_reach(f64::from(mm)).replace("cycle 4 steps", "cycle 40 steps");
-        let (body, _) = text.rsplit_once('}').unwrap();
-        format!(
-            "{body}    minimize {{ track(tip), stress(below = 0.1 MPa), torque(bend, scale = 0.01 N*mm) }}\n}}\n"
-        )
-    };
+    let slow = |mm: u32| optimised(mm, 40);
     let view = View::of(&slow(30));
     let mut events = Events::of(&view);
     let running = |s: &Value| {

@@ -47,15 +47,28 @@ enum OptimizerName {
     CmaEs,
 }
 
+impl From<OptimizerName> for Optimizer {
+    fn from(name: OptimizerName) -> Self {
+        match name {
+            OptimizerName::Lm => Self::Lm,
+            OptimizerName::Lbfgs => Self::Lbfgs,
+            OptimizerName::CmaEs => Self::CmaEs,
+        }
+    }
+}
+
 /// Findings about the configuration, and the texts they point into.
 pub type Faults = (Vec<Diagnostic>, SourceMap);
 
 /// Puts the configuration's values where the command line gave none.
 pub fn apply(cli: &mut Cli, matches: &ArgMatches) -> Result<(), Faults> {
     let Some((_, given)) = matches.subcommand() else { return Ok(()) };
-    let said = |name: &str| given.value_source(name) == Some(ValueSource::CommandLine);
-    let Some(common) = cli.command.common() else { return Ok(()) };
-    let Some((config, folder)) = read(&common.source)? else { return Ok(()) };
+    // Not every command has every option, and of one that it has not it must not be asked.
+    let said = |name: &str| {
+        given.try_contains_id(name).is_ok() && given.value_source(name) == Some(ValueSource::CommandLine)
+    };
+    let Some(source) = cli.command.source() else { return Ok(()) };
+    let Some((config, folder)) = read(source)? else { return Ok(()) };
     let table = config.build;
     if let (false, Some(threads), Some(common)) = (said("threads"), table.threads, cli.command.common_mut()) {
         common.threads = Some(threads.get());
@@ -67,17 +80,15 @@ pub fn apply(cli: &mut Cli, matches: &ArgMatches) -> Result<(), Faults> {
     {
         *chosen = folder.join(out);
     }
-    if let Command::Build(build) = &mut cli.command {
-        if let (false, Some(iterations)) = (said("iterations"), table.iterations) {
-            build.iterations = iterations;
+    let iterations = table.iterations.filter(|_| !said("iterations"));
+    let optimizer = table.optimizer.map(Optimizer::from);
+    match &mut cli.command {
+        Command::Build(build) => {
+            build.iterations = iterations.unwrap_or(build.iterations);
+            build.optimizer = optimizer.filter(|_| !said("optimizer")).unwrap_or(build.optimizer);
         }
-        if let (false, Some(optimizer)) = (said("optimizer"), table.optimizer) {
-            build.optimizer = match optimizer {
-                OptimizerName::Lm => Optimizer::Lm,
-                OptimizerName::Lbfgs => Optimizer::Lbfgs,
-                OptimizerName::CmaEs => Optimizer::CmaEs,
-            };
-        }
+        Command::View(view) => view.configure(iterations, optimizer, table.threads.map(|n| n.get())),
+        _ => (),
     }
     Ok(())
 }
@@ -91,6 +102,14 @@ impl Command {
             Command::Build(build) => Some(&build.common),
             Command::Simulate(simulate) => Some(&simulate.common),
             _ => None,
+        }
+    }
+
+    /// The design whose configuration counts.
+    fn source(&self) -> Option<&Path> {
+        match self {
+            Command::View(view) => Some(view.source()),
+            _ => self.common().map(|c| c.source.as_path()),
         }
     }
 

@@ -18,7 +18,7 @@ use clap::Args;
 use engine::{Asked, Engine};
 use flexura::pipeline::Compiler;
 use server::Service;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Arguments of `view`.
@@ -41,8 +41,27 @@ pub struct View {
     /// Iterations of the optimiser at most
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(0..=100_000))]
     iterations: u32,
+    /// By the configuration only, as the next.
+    #[arg(skip = Optimizer::Lm)]
+    optimizer: Optimizer,
+    #[arg(skip)]
+    threads: Option<u16>,
     #[command(flatten)]
     lints: LintFlags,
+}
+
+impl View {
+    /// The design.
+    pub fn source(&self) -> &Path {
+        &self.source
+    }
+
+    /// Takes what the configuration says and the command line does not.
+    pub fn configure(&mut self, iterations: Option<u32>, optimizer: Option<Optimizer>, threads: Option<u16>) {
+        self.iterations = iterations.unwrap_or(self.iterations);
+        self.optimizer = optimizer.unwrap_or(self.optimizer);
+        self.threads = threads;
+    }
 }
 
 /// Runs `view`.
@@ -59,8 +78,14 @@ pub fn view(arguments: &View) -> u8 {
     if let Err(why) = super::commands::open(&common) {
         return super::commands::unreadable(&common, &why);
     }
+    if let Some(n) = arguments.threads {
+        // What the view computes runs in threads of its own: they share the process's pool.
+        if let Err(why) = rayon::ThreadPoolBuilder::new().num_threads(usize::from(n)).build_global() {
+            return refuse("E0754", format!("cannot start {n} threads: {why}"), Format::Human);
+        }
+    }
     let source = engine::source_of(&common);
-    let compiler = Compiler { method: Optimizer::Lm.into(), iterations: arguments.iterations as usize };
+    let compiler = Compiler { method: arguments.optimizer.into(), iterations: arguments.iterations as usize };
     let engine = Arc::new(Engine::new(Asked { common, lints: arguments.lints.clone(), compiler }));
     let service = match Service::new(Arc::clone(&engine), arguments.port) {
         Ok(service) => service,
