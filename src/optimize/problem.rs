@@ -197,9 +197,14 @@ impl<'d> Problem<'d> {
             Cow::Owned(layout) => objectives::build(self.design, layout).1,
         };
         let model = Model::new(self.design, layout, &p, self.edges, true).ok()?;
-        let cycle = sweep_both_ways(&model).ok()?;
-        let loaded = self.load(&model, &cycle, &cases)?;
-        let capsules = self.links(&model)?;
+        // The two sides of a cycle are not equally long: meanwhile links are planned.
+        let states = || {
+            let cycle = sweep_both_ways(&model).ok()?;
+            let loaded = self.load(&model, &cycle, &cases)?;
+            Some((cycle, loaded))
+        };
+        let (capsules, states) = rayon::join(|| self.links(&model), states);
+        let (capsules, (cycle, loaded)) = (capsules?, states?);
         let views: Vec<StateView> = (0..self.layout.counted_states())
             .map(|s| self.view(&model, &cycle, &loaded, &capsules, s))
             .collect();
