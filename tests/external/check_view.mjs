@@ -34,12 +34,16 @@ const source = join(folder, basename(design)), lock = source.replace(/\.mech$/, 
 cpSync(dirname(design), folder, { recursive: true, filter: (path) => basename(path) !== "out" });
 const text = readFileSync(source, "utf8");
 
-const view = spawn(flexura, ["view", source], { stdio: ["ignore", "pipe", "inherit"] });
-const ended = new Promise((done) => view.on("exit", done));
-const address = await new Promise((found, lost) => {
-    view.stdout.once("data", (d) => found(String(d).trim()));
-    view.once("exit", (code) => lost(new Error(`it ended with ${code}`)));
-});
+async function started() {
+    const view = spawn(flexura, ["view", source], { stdio: ["ignore", "pipe", "inherit"] });
+    const ended = new Promise((done) => view.on("exit", done));
+    const address = await new Promise((found, lost) => {
+        view.stdout.once("data", (d) => found(String(d).trim()));
+        view.once("exit", (code) => lost(new Error(`it ended with ${code}`)));
+    });
+    return { address, end: async () => { view.kill("SIGINT"); return ended; } };
+}
+let { address, end } = await started();
 const browser = await puppeteer.launch({
     executablePath: process.env.CHROMIUM || "/usr/bin/chromium",
     headless: true,
@@ -63,7 +67,13 @@ async function open({ width, height, dark }) {
     await page.setViewport({ width, height, deviceScaleFactor: width < 500 ? 2 : 1 });
     await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: dark ? "dark" : "light" }]);
     await page.goto(address, { waitUntil: "load" });
-    await until(page, "it is drawn", () => document.documentElement.dataset.ready === "yes" && document.documentElement.dataset.drawn !== undefined);
+    return page;
+}
+
+const drawn = (page) => until(page, "it is drawn", () => document.documentElement.dataset.ready === "yes" && document.documentElement.dataset.drawn !== undefined);
+async function shown(how) {
+    const page = await open(how);
+    await drawn(page);
     return page;
 }
 
@@ -84,7 +94,7 @@ const look = (page) => page.evaluate(() => globalThis.flexura.look());
 /** Where the first trace leads: what the page shows of the motion. */
 const trace = (page) => page.evaluate(() => JSON.parse(document.getElementById("data").textContent).traces.map((t) => t.path.slice(2).join()).join(";"));
 
-let page = await open({ width: 1360, height: 900, dark: false });
+let page = await shown({ width: 1360, height: 900, dark: false });
 console.log(`${basename(design)} at ${address}`);
 await until(page, "solids", () => document.documentElement.dataset.phase === "");
 await page.evaluate(() => new Promise((done) => setTimeout(done, 400)));
@@ -162,10 +172,10 @@ const wide = await page.evaluate(() => document.documentElement.scrollWidth);
 must(wide <= 1360, `the page is ${wide} pixels wide`);
 await page.close();
 
-page = await open({ width: 1360, height: 900, dark: true });
+page = await shown({ width: 1360, height: 900, dark: true });
 await picture(page, "view-dark");
 await page.close();
-page = await open({ width: 375, height: 740, dark: false });
+page = await shown({ width: 375, height: 740, dark: false });
 const narrow = await page.evaluate(() => document.documentElement.scrollWidth);
 must(narrow <= 375, `on a phone the page is ${narrow} pixels wide`);
 await picture(page, "view-phone");
@@ -180,9 +190,22 @@ const nameless = await page.evaluate(() => [...document.querySelectorAll("button
 must(nameless.length === 0, `without a name: ${nameless}`);
 must(told.length === 0, told.join("\n         "));
 
-view.kill("SIGINT");
-const code = await ended;
+const code = await end();
 must(code === 0, `Ctrl-C ends it with ${code}`);
+await page.close();
+
+// Begun with a broken text, which is still there.
+({ address, end } = await started());
+page = await open({ width: 1360, height: 900, dark: false });
+await until(page, "the error from the beginning", () => document.getElementById("live-fault")?.checkVisibility());
+must(!(await page.$eval("#live-status", (e) => e.textContent)).includes("last page"), "it speaks of a page that never was");
+must(await page.$eval("#live-fault pre", (e) => getComputedStyle(e).textAlign) !== "center", "the text's lines are centred");
+await picture(page, "view-begun-broken");
+writeFileSync(source, text);
+await drawn(page);
+await until(page, "the error goes away", () => !document.getElementById("live-fault"));
+must(told.length === 0, told.join("\n         "));
+await end();
 await browser.close();
 rmSync(folder, { recursive: true });
 console.log(`  renewed ${took} ms after a save, error told after ${faulted} ms, gone after ${mended} ms, slider shown after ${moved} ms`);

@@ -69,7 +69,7 @@ const number = (v) => {
 function say(state) {
     const solving = state.solving, tried = state.parameters.filter((p) => p.set !== null).map((p) => p.path);
     let text = "Up to date.";
-    if (state.fault) text = "The text has errors: this is the last page without.";
+    if (state.fault) text = state.version ? "The text has errors: this is the last page without." : "The text has errors: the page comes with the first text without.";
     else if (solving?.running) {
         const first = solving.points[0], last = solving.points.at(-1);
         const of = solving.design ? ` ${solving.design}` : "";
